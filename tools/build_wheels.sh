@@ -127,7 +127,7 @@ chosen_wheel() {
   ls "$output"/chosen/*.whl
 }
 
-# HOME: matplotlib and others keep a cache there.
+# HOME: some packages keep a cache there.
 tried() {
   env -i PATH="$scratch/nothing" HOME="$scratch/home" LC_ALL=C.UTF-8 OPENBLAS_NUM_THREADS=1 \
     "$1/bin/python" -I tools/wheel/try_wheel.py "$scratch/work-$2" --version "$version" \

@@ -1,6 +1,6 @@
-"""Makes the pictures of docs/guide by the commands of its pages, on the recordings of examples/.
+"""Makes the pictures of docs/guide, docs/reference/paper.md and examples/mujoco by the commands of these pages.
 
-    python docs/figures/make_guide.py [-o FOLDER]      some 4 min of one core; needs tendonfmu, Pillow and Chromium
+    python docs/figures/make_guide.py [-o FOLDER]      some 5 min of one core; needs tendonfmu, Pillow, MuJoCo, Chromium
 
 The pages that the commands write are photographed in a headless Chromium, and become small PNGs.
 """
@@ -55,6 +55,15 @@ def main() -> None:
         keep(photograph(folder / "score" / "score.html", 1130, "contacts"), output / "detect.png")
         servo_history(folder)
         keep(photograph(folder / "history" / "history.html", 980), output / "change.png")
+        drawings(folder, output)
+
+
+def drawings(folder: Path, output: Path) -> None:
+    """The paper's figures, drawn again, and the force on a plate."""
+    subprocess.run([sys.executable, "-m", "evidence", "fit.paper", "-o", folder], cwd=EXAMPLES.parent, check=True)
+    subprocess.run([sys.executable, EXAMPLES / "mujoco" / "press.py", "-o", folder / "mujoco_press.html"], check=True)
+    for page in [folder / "mujoco_press.html", *(folder / "fit.paper").glob("paper_*.html")]:
+        keep(photograph(page, 1100, width=820), output / f"{page.stem}.png")
 
 
 def servo_history(folder: Path) -> None:
@@ -73,15 +82,15 @@ def tendonfmu(folder: Path, *words: str | Path) -> None:
     subprocess.run(command, cwd=folder, check=True, stdout=subprocess.DEVNULL)
 
 
-def photograph(page: Path, height: int, place: str = "") -> Path:
-    """`height` pixels of a page, 1280 pixels wide, from its top, or of the element with an id alone."""
+def photograph(page: Path, height: int, place: str = "", width: int = 1280) -> Path:
+    """`height` pixels of a page, `width` pixels wide, from its top, or of the element with an id alone."""
     picture = page.with_suffix(".png")
     browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
     if browser is None:
         raise SystemExit("make_guide.py: no Chromium found; expected chromium or google-chrome on the PATH")
     # figures are drawn after the page has loaded
     options = ["--headless", "--no-sandbox", "--hide-scrollbars", "--virtual-time-budget=5000"]
-    options.append(f"--window-size=1280,{height}")
+    options.append(f"--window-size={width},{height}")
     styles = ".modebar { display: none }"
     if place:  # a page that is scrolled is photographed white, so all else is hidden
         shown = ", ".join(f"#{each}, #{each} *" for each in (place, "js-plotly-tester"))  # which measures texts

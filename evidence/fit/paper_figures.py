@@ -6,12 +6,9 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 
@@ -20,14 +17,15 @@ from evidence.part import Figures
 from evidence.table import rms
 from tendonfmu.arrays import Numbers
 from tendonfmu.detect.counting import stretches
+from tendonfmu.drawing import ORANGE, SILVER, series_figure
 from tendonfmu.estimate import FrictionFit
 from tendonfmu.model.native import run_recording
-from tendonfmu.recordings import Recording, read_recording
+from tendonfmu.recordings import Recording, flagged_stretches, read_recording
 
 CALIBRATED = EXAMPLES / "demo_recording" / "index_finger_calibrated.json"
 JOINTS = (0, 1)  # the paper shows the first two
 SHOWN = (20.0, 36.0)  # s
-MEASURED, PREDICTED, SENSED, FOUND = "#222222", "#56b4e9", "#009e73", "#e69f00"
+REST = ("|v| ≤ v_min: the bias holds the friction", SILVER)
 
 LAW = {"static": 0.020, "coulomb": 0.014, "stribeck_velocity": 0.1, "viscous": 0.006}  # N·m, rad/s, N·m·s/rad
 THRESHOLD = 0.05  # rad/s; wide enough to be seen
@@ -74,12 +72,8 @@ def figure_2b(folder: Path) -> Figures:
     outputs = run_joint(speed)
     friction = (outputs["friction_torque"] - outputs["bias_torque"])[:, 0]
     expected = np.where(np.abs(speed) > THRESHOLD, law(speed), 0.0)
-    figure, axis = plt.subplots(figsize=(6, 3.2), layout="constrained")
-    axis.plot(speed, 1e3 * law(speed), color="#bbbbbb", linestyle="--", label="eq. (1)")
-    axis.plot(speed, 1e3 * friction, color=PREDICTED, label="the core")
-    axis.axvspan(-THRESHOLD, THRESHOLD, color="#f0e6d0", label="|v| ≤ v_min: the bias holds the friction")
-    axis.set(xlabel="joint velocity (rad/s)", ylabel="friction (mN·m)")
-    finish(figure, [axis], folder / "paper_2b.png")
+    rows = {"friction (mN·m)": {"eq. (1)": 1e3 * law(speed), "the core": 1e3 * friction}}
+    draw(folder / "paper_2b.html", "joint velocity (rad/s)", speed, rows, {REST: [(-THRESHOLD, THRESHOLD)]})
     return {"largest_difference": float(np.abs(friction - expected).max())}
 
 
@@ -91,16 +85,10 @@ def figure_5(folder: Path) -> Figures:
     outputs = run_joint(speed)
     total, bias = outputs["friction_torque"][:, 0], outputs["bias_torque"][:, 0]
     time = np.arange(len(speed)) / RATE
-    figure, axes = plt.subplots(2, 1, figsize=(7, 4.2), sharex=True, layout="constrained")
-    axes[0].plot(time, speed, color=MEASURED)
-    axes[0].axhspan(-THRESHOLD, THRESHOLD, color="#f0e6d0")
-    axes[0].set(ylabel="velocity (rad/s)")
-    axes[1].plot(time, 1e3 * bias, color=FOUND, label="bias b_eff")
-    axes[1].plot(time, 1e3 * (total - bias), color=MEASURED, linewidth=1, label="friction T by eq. (1)")
-    axes[1].plot(time, 1e3 * total, color=PREDICTED, label="both, T_eff")
-    axes[1].set(xlabel="time (s)", ylabel="torque (mN·m)")
-    finish(figure, axes, folder / "paper_5.png")
     slow = np.abs(speed) <= THRESHOLD
+    torques = {"bias b_eff": 1e3 * bias, "friction T by eq. (1)": 1e3 * (total - bias), "both, T_eff": 1e3 * total}
+    rows = {"velocity (rad/s)": {"velocity": speed}, "torque (mN·m)": torques}
+    draw(folder / "paper_5.html", "time (s)", time, rows, {REST: flagged_stretches(time, slow)})
     steps = np.abs(np.diff(total))
     enters, leaves = np.flatnonzero(~slow[:-1] & slow[1:]), np.flatnonzero(slow[:-1] & ~slow[1:])
     twice = 2.0 * float(law(np.array([THRESHOLD]))[0])
@@ -138,14 +126,16 @@ def prediction(number: int, fit: FrictionFit, case: tuple[Path, Recording, pd.Da
     friction = joints_of(truth, "friction_torque")
     time = recording.time
     show = (time >= SHOWN[0]) & (time <= SHOWN[1])
-    figure, axes = plt.subplots(2, 1, figsize=(8, 4.6), sharex=True, layout="constrained")
-    for axis, joint in zip(axes, JOINTS, strict=True):
-        axis.plot(time[show], 1e3 * torque[show, joint], color=MEASURED, label=f"τ{joint + 1} of the tendons")
-        axis.plot(time[show], 1e3 * friction[show, joint], color=SENSED, linewidth=1, label="true friction")
-        axis.plot(time[show], 1e3 * predicted[show, joint], color=PREDICTED, label=f"T{joint + 1} predicted")
-        axis.set(ylabel="torque (mN·m)")
-    axes[-1].set(xlabel="time (s)")
-    finish(figure, axes, folder / f"paper_{number}.png")
+    rows = {}
+    for joint in JOINTS:
+        curves = {
+            f"τ{joint + 1} of the tendons": torque,
+            "true friction": friction,
+            f"T{joint + 1} predicted": predicted,
+        }
+        label = f"joint {joint + 1}, torque (mN·m)"
+        rows[label] = {name: 1e3 * values[show, joint] for name, values in curves.items()}
+    draw(folder / f"paper_{number}.html", "time (s)", time[show], rows)
     known = ~np.isnan(predicted).any(axis=1)
     return {
         "torque": [1e3 * rms(torque[known, joint]) for joint in JOINTS],
@@ -180,38 +170,28 @@ def draw_8(
     time: Numbers, torque: Numbers, outputs: dict[str, Numbers], external: Numbers, force: Numbers, folder: Path
 ) -> None:
     show = (time >= SHOWN[0]) & (time <= SHOWN[1])
-    figure, axes = plt.subplots(4, 1, figsize=(8, 7), sharex=True, layout="constrained", height_ratios=[3, 3, 2, 1])
-    for joint, colour in zip(JOINTS, (MEASURED, PREDICTED), strict=True):
-        axes[0].plot(time[show], 1e3 * torque[show, joint], color=colour, label=f"τ{joint + 1}")
-        compensated = 1e3 * outputs["compensated_torque"][show, joint]
-        axes[1].plot(time[show], compensated, color=colour, label=f"τ{joint + 1} − T{joint + 1}")
-        axes[1].plot(time[show], 1e3 * external[show, joint], color=SENSED, linestyle="--", linewidth=1)
-    axes[1].plot([], [], color=SENSED, linestyle="--", linewidth=1, label="true external torque")
-    axes[2].plot(time[show], force[show], color=SENSED, label="|F| of the push")
-    axes[3].fill_between(time[show], outputs["contact"].reshape(-1)[show], color=FOUND, step="post", label="contact")
-    for axis, unit in zip(axes, ("torque (mN·m)", "compensated (mN·m)", "force (N)", ""), strict=True):
-        axis.set(ylabel=unit)
-    axes[3].set(xlabel="time (s)", yticks=[])
-    finish(figure, axes, folder / "paper_8.png")
+    felt = {f"τ{joint + 1} − T{joint + 1}": outputs["compensated_torque"][:, joint] for joint in JOINTS}
+    felt |= {f"true external torque {joint + 1}": external[:, joint] for joint in JOINTS}
+    rows = {
+        "torque (mN·m)": {f"τ{joint + 1}": 1e3 * torque[show, joint] for joint in JOINTS},
+        "compensated (mN·m)": {name: 1e3 * values[show] for name, values in felt.items()},
+        "force (N)": {"|F| of the push": force[show]},
+    }
+    contact = flagged_stretches(time[show], outputs["contact"].reshape(-1)[show])
+    draw(folder / "paper_8.html", "time (s)", time[show], rows, {("contact", ORANGE): contact})
 
 
 # --- all --------------------------------------------------------------------------------------------------------------
 
 
-def finish(figure: Any, axes: Any, file: Path) -> None:
-    for axis in axes:
-        axis.spines[["top", "right"]].set_visible(False)
-        axis.grid(axis="y", color="#e5e5e5")
-        if axis.get_legend_handles_labels()[0]:
-            axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize=8, ncols=3, frameon=False)
-    figure.savefig(file, dpi=110)
-    plt.close(figure)
+def draw(file: Path, x_label: str, x: Numbers, rows: Any, shaded: Any = MappingProxyType({})) -> None:
+    series_figure("", x_label, x, rows, shaded).write_html(file)
 
 
 def measure(folder: Path, workers: int) -> Figures:
-    """The figures as paper_*.png in the folder, and their numbers."""
+    """The figures as paper_*.html in the folder, and their numbers."""
     low, high, pushes = (simulated(rig, folder) for rig in ("index_finger", "index_finger_x4", "index_finger_pushes"))
-    fit = FrictionFit(INDEX_FINGER, uncertainty=False).fit([low[0]])
+    fit = FrictionFit(INDEX_FINGER).fit([low[0]])
     return {
         "2b": figure_2b(folder),
         "5": figure_5(folder),

@@ -1,6 +1,6 @@
 """Presses on a moving plate in MuJoCo, with friction compensation and without: figures, and one picture.
 
-    python press.py [finger_calibrated.json] [-o press.png]
+    python press.py [finger_calibrated.json] [-o press.html]
 
 After a warm-up of free strokes the finger closes until it feels the wanted force, and holds it: 0.5 N, then 1 N, while
 the plate moves by 3 mm. It feels the force by its tendons alone. Three ways are compared: the compensated torque, the
@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from plotly.subplots import make_subplots
 from tendon_finger import HERE, STEP, Array, Runner, TendonFinger, step
 
 HOLD = 8.0  # s, each wanted force
@@ -29,6 +30,7 @@ PLATE, WAVE, WAVES = -0.052, 0.003, 0.4  # m, m, Hz
 GAIN, FASTEST = 1.5, 0.3  # rad/s per N, rad/s
 PERIOD = np.pi * STROKE / FASTEST  # s, of a stroke forth and back
 WARM_UP = 2 * PERIOD  # s
+BLUE, ORANGE, GREY = "#0072B2", "#D55E00", "#8A8A8A"
 WAYS = ("compensated torque", "joint torque", "joint torque, offset known")
 
 
@@ -125,26 +127,30 @@ def figures(run: Run, hold: float = HOLD) -> list[str]:
 
 
 def draw(runs: list[Run], target: Path) -> None:
-    """True force over time, one panel for each way."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(10, 6), layout="constrained")
-    for axes, run in zip(figure.subplots(len(runs), 1, sharex=True, sharey=True), runs, strict=True):
-        axes.plot(run.time, run.felt, color="#D55E00", linewidth=0.8, label="felt")
-        axes.plot(run.time, run.true, color="#0072B2", linewidth=1.4, label="true force on the plate")
-        axes.plot(run.time, run.wanted, color="#333333", linewidth=1.2, linestyle="--", label="wanted")
-        axes.set_title(run.way, loc="left", fontsize=11)
-        axes.set_ylabel("force (N)")
-        axes.spines[["top", "right"]].set_visible(False)
-    figure.axes[0].legend(loc="upper left", frameon=False, ncols=3)
-    figure.axes[-1].set_xlabel("time (s)")
-    figure.savefig(target, dpi=100)
+    """True force over time as a page, one panel for each way."""
+    figure = make_subplots(
+        len(runs),
+        1,
+        shared_xaxes=True,
+        shared_yaxes="all",
+        vertical_spacing=0.07,
+        subplot_titles=WAYS,
+        y_title="force (N)",
+    )
+    for row, run in enumerate(runs, start=1):
+        curves = {"felt": (run.felt, ORANGE), "true force on the plate": (run.true, BLUE), "wanted": (run.wanted, GREY)}
+        for name, (force, colour) in curves.items():
+            line = {"color": colour, "width": 1.2}
+            figure.add_scatter(x=run.time, y=force, name=name, line=line, showlegend=row == 1, row=row, col=1)
+    figure.update_xaxes(title="time (s)", row=len(runs))
+    figure.update_layout(template="plotly_white", height=620, legend={"orientation": "h"}, margin={"t": 30, "r": 10})
+    figure.write_html(target)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("finger", type=Path, nargs="?", default=HERE / "finger_calibrated.json")
-    parser.add_argument("-o", "--output", type=Path, metavar="PICTURE.png")
+    parser.add_argument("-o", "--output", type=Path, metavar="PICTURE.html")
     given = parser.parse_args()
     description = json.loads(given.finger.read_text(encoding="utf-8"))
     runs = [press(way, description) for way in WAYS]

@@ -319,7 +319,7 @@ def test_a_reader_that_leaves_ends_nothing(case: Path) -> None:
 # --- imports ----------------------------------------------------------------------------------------------------------
 
 
-HEAVY = {"dask", "fmpy", "jinja2", "lxml", "matplotlib", "mcap", "mujoco", "pandas", "pint", "plotly", "pyarrow",
+HEAVY = {"dask", "fmpy", "jinja2", "lxml", "mcap", "mujoco", "pandas", "pint", "plotly", "pyarrow",
          "scipy"}  # fmt: skip
 START = """
 import contextlib, io, json, sys

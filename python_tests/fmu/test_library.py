@@ -156,7 +156,7 @@ def other_fmu(tmp_path_factory: pytest.TempPathFactory) -> UnpackedFmu:
 
     folder = tmp_path_factory.mktemp("other_fmu")
     description = FINGER | {"name": "other finger", "tendons": FINGER["tendons"][:2]}
-    return unpack(build_fmu(description, folder / "other.fmu", illustrated=False), folder / "unpacked")
+    return unpack(build_fmu(description, folder / "other.fmu"), folder / "unpacked")
 
 
 @pytest.mark.long

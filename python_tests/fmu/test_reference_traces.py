@@ -46,7 +46,7 @@ def fmus(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "3").mkdir()
     for name, fmi in FMUS:
         output = (folder if fmi == 2 else folder / "3") / f"{name}.fmu"
-        build_fmu(traces.TRACES[name][0], output, illustrated=False, fmi=fmi)
+        build_fmu(traces.TRACES[name][0], output, fmi=fmi)
     return folder
 
 

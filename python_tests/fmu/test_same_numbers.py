@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 def test_a_recording_gives_the_same_columns_in_both_versions(tmp_path: Path) -> None:
     finger = ROOT / "examples" / "fingers" / "index_finger.json"
     recording = read_recording(TESTS / "reference" / "index_finger_in.csv")
-    fmus = [build_fmu(finger, tmp_path / f"{fmi}.fmu", illustrated=False, fmi=fmi) for fmi in (2, 3)]
+    fmus = [build_fmu(finger, tmp_path / f"{fmi}.fmu", fmi=fmi) for fmi in (2, 3)]
     two, three = (run_fmu(fmu, recording) for fmu in fmus)
     assert list(two) == list(three) and len(two) > 20
     for name, column in two.items():
@@ -50,7 +50,7 @@ def test_all_outputs_that_there_may_be(tmp_path: Path) -> None:
     }
     rows = []
     for fmi in (2, 3):
-        fmu = unpack(build_fmu(description, tmp_path / f"{fmi}.fmu", illustrated=False, fmi=fmi), tmp_path / str(fmi))
+        fmu = unpack(build_fmu(description, tmp_path / f"{fmi}.fmu", fmi=fmi), tmp_path / str(fmi))
         names = [name for kind in ("Float64", "Boolean", "Int32") for name in fmu.names("output", kind)]
         assert {"contact_observable", "contact_level[2]", "fingertip_force[3]", "contact_link"} <= set(names)
         with Instance(fmu) as instance:
@@ -79,7 +79,7 @@ def test_the_fmu_is_the_native_finger(seed: int, source: int, fmi: int, tmp_path
     """With `extensions`: outputs, directional derivatives, declared dependencies; with a saved state in another one."""
     samples = 60
     description, recording = random_case(seed, samples, extensions=True)
-    fmu = unpack(build_fmu(description, tmp_path / "finger.fmu", illustrated=False, fmi=fmi), tmp_path / "unpacked")
+    fmu = unpack(build_fmu(description, tmp_path / "finger.fmu", fmi=fmi), tmp_path / "unpacked")
     time, names = recording["time"].tolist(), fmu.names("output")
     finger = native.Instance.from_description(description, source)
     with Instance(fmu) as instance, Instance(fmu) as other:

@@ -234,9 +234,7 @@ def test_blocks_of_another_fmu_are_neither_read_nor_written(small: UnpackedFmu, 
     from tendonfmu.fmu import build_fmu
 
     description = FINGER | {"name": "other finger", "tendons": FINGER["tendons"][:2]}
-    other_fmu = unpack(
-        build_fmu(description, tmp_path / "other.fmu", illustrated=False, fmi=small.version), tmp_path / "other"
-    )
+    other_fmu = unpack(build_fmu(description, tmp_path / "other.fmu", fmi=small.version), tmp_path / "other")
     with Instance(small) as mine, Instance(other_fmu) as other:
         block, size = ctypes.c_void_p(), ctypes.c_size_t()
         assert other.call("GetFMUState", pointer(block)) == OK

@@ -181,7 +181,7 @@ def test_the_fmu_has_the_outputs_where_there_are_links(tmp_path: Path) -> None:
         if not with_geometry:
             del description["links"], description["tip"]
         source.write_text(json.dumps(description))
-        fmu = build_fmu(source, tmp_path / "spatial.fmu", illustrated=False)
+        fmu = build_fmu(source, tmp_path / "spatial.fmu")
         assert validate_fmu(str(fmu)) == []
         out = run_fmu(fmu, recording)
         assert any(name.startswith("fingertip") or name == "contact_link" for name in out) == with_geometry

@@ -17,7 +17,8 @@ from tendonfmu.diagnosis.names import title_of
 from tendonfmu.diagnosis.reported import reported_causes
 from tendonfmu.diagnosis.result import Diagnosis, ModelErrors
 from tendonfmu.diagnosis.sizes import size_of
-from tendonfmu.report.diagnosis_files import build_report, report_text
+from tendonfmu.files import report_text
+from tendonfmu.report.diagnosis_files import build_report
 from tendonfmu.report.diagnosis_text import left_of, left_sentence, lines, tables, unit_of
 from tendonfmu.report.numbers import percent, percent_interval, probability
 from tendonfmu.statistics.intervals import Interval

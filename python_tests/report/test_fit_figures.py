@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tendonfmu.drawing.panel import Curve, Panel
+from tendonfmu.arrays import Numbers
+from tendonfmu.drawing import Panel
 from tendonfmu.estimate.picture import CONFIDENCE, FitPicture, LawBands
 from tendonfmu.model import finger_from_data, native
 from tendonfmu.model.friction_places import Effect, effects
@@ -25,9 +26,10 @@ MILLI = 1e3
 EDGE = "tendons[1].edge_friction[1]"  # with a law at each of two angles
 
 
-def curve(panel: Panel, style: str) -> Curve:
-    (drawn,) = [one for one in panel.curves if one.style == style]
-    return drawn
+def drawn_as(panel: Panel, name: str) -> tuple[Numbers, Numbers]:
+    """x and y of the curve of a name."""
+    (trace,) = [trace for trace in panel.traces if trace["name"] == name and trace["mode"] == "lines"]
+    return trace["x"], trace["y"]
 
 
 # --- over time --------------------------------------------------------------------------------------------------------
@@ -42,16 +44,19 @@ def test_torque_over_time_is_that_of_the_recording(fit: FitPicture) -> None:
         (compared, fit.series[1], None),
     ):
         (panel,) = sheet.panels
-        measured, predicted, bias = (curve(panel, style) for style in ("measured", "predicted", "bias"))
-        rows = np.searchsorted(series.time, measured.x)
-        np.testing.assert_array_equal(series.time[rows], measured.x)
-        np.testing.assert_allclose(measured.y, MILLI * series.torque[rows, 0])
-        np.testing.assert_allclose(measured.y - predicted.y, MILLI * series.residual[rows, 0], atol=1e-9)
-        np.testing.assert_allclose(predicted.y - bias.y, MILLI * series.model_torque[rows, 0], atol=1e-9)
-        share = rms(measured.y - predicted.y) / rms(measured.y)
+        time, measured = drawn_as(panel, "measured joint torque")
+        _, predicted = drawn_as(panel, "model with bias, before the bias learns from the sample")
+        _, bias = drawn_as(panel, "bias alone")
+        rows = np.searchsorted(series.time, time)
+        np.testing.assert_array_equal(series.time[rows], time)
+        np.testing.assert_allclose(measured, MILLI * series.torque[rows, 0])
+        np.testing.assert_allclose(measured - predicted, MILLI * series.residual[rows, 0], atol=1e-9)
+        np.testing.assert_allclose(predicted - bias, MILLI * series.model_torque[rows, 0], atol=1e-9)
+        inside = (series.time >= time[0]) & (series.time <= time[-1])  # all of them; the curves are thinned
+        share = rms(series.residual[inside, 0]) / rms(series.torque[inside, 0])
         assert panel.note == f"residual {100 * share:.0f} % of torque"
         assert flags is None or flags[rows[:-1]].all()
-        assert 0.8 * SHOWN < measured.x[-1] - measured.x[0] < SHOWN + 0.01
+        assert 0.8 * SHOWN < time[-1] - time[0] < SHOWN + 0.01
 
 
 # --- friction laws ----------------------------------------------------------------------------------------------------
@@ -74,8 +79,8 @@ def test_a_law_is_drawn_as_the_model_has_it(fit: FitPicture) -> None:
     finger = finger_from_data(data)
     bare = FitPicture({"parameters": []}, finger, finger, [], np.zeros(0), np.zeros((0, 0)), [])
     (sheet,) = law_sheets(bare)
-    drawn = curve(sheet.panels[0], "fitted")
-    velocity = drawn.x[np.abs(drawn.x) > 0.0201]
+    x, friction = drawn_as(sheet.panels[0], "fitted")
+    velocity = x[np.abs(x) > 0.0201]
     inputs = {
         "time": np.arange(len(velocity)) * 0.01,
         "tendon_force": np.full((len(velocity), 2), 5.0),
@@ -84,8 +89,8 @@ def test_a_law_is_drawn_as_the_model_has_it(fit: FitPicture) -> None:
     }
     outputs = native.Instance.from_description(data, 3).run(inputs)
     torque = (outputs["friction_torque"] - outputs["bias_torque"])[:, 0]
-    np.testing.assert_allclose(drawn.y[np.abs(drawn.x) > 0.0201], MILLI * torque, rtol=1e-9)
-    assert (drawn.y[np.abs(drawn.x) < 0.0199] == 0.0).all()
+    np.testing.assert_allclose(friction[np.abs(x) > 0.0201], MILLI * torque, rtol=1e-9)
+    assert (friction[np.abs(x) < 0.0199] == 0.0).all()
 
 
 def effect_at(fit: FitPicture, path: str) -> Effect:

@@ -23,11 +23,9 @@ from tendonfmu.diagnosis.result import Diagnosis, RemainderMap
 from tendonfmu.estimate.picture import FitPicture
 from tendonfmu.report.diagnosis_page import diagnosis_page, waterfall_of
 from tendonfmu.report.diagnosis_text import names_of
-from tendonfmu.report.fit_figures import fit_sheets
 from tendonfmu.report.fit_page import fit_page
 from tendonfmu.report.fit_text import residual_tables
 from tendonfmu.report.numbers import percent_interval
-from tendonfmu.report.page import drawn
 from tendonfmu.report.run_page import run_page, run_report
 from tendonfmu.statistics.intervals import Interval
 
@@ -37,7 +35,7 @@ HOSTILE = "<script>alert('x')</script>&\"$\\frac{"
 @pytest.fixture(scope="module")
 def pages(fit: FitPicture, full: Diagnosis, table: dict[str, Any], run_numbers: dict[str, Any]) -> dict[str, str]:
     return {
-        "fit": fit_page(fit, drawn(fit_sheets(fit))),
+        "fit": fit_page(fit),
         "diagnosis": diagnosis_page(full),
         "run": run_page(run_numbers, table, np.arange(len(table["time"])) < 120),
     }
@@ -119,7 +117,7 @@ def test_the_page_of_a_fit_holds_its_numbers(fit: FitPicture, pages: dict[str, s
     for entry in fit.report["parameters"]:
         assert entry["path"].split(".", 1)[1] in page and f"{entry['value']:.4g}".rstrip("0") in numbers, entry
     assert numbers.count('class="doubtful"') == sum(not entry["identified"] for entry in fit.report["parameters"])
-    tables = list(residual_tables(fit))
+    tables = residual_tables(fit.report, fit.fitted.joint_names)
     assert [part.title for part in tables] == ["Training", "Held out of training", "Not trained on: x4"]
     for part, data in zip(tables, (residual, fit.report["residual"]["held_out"]), strict=False):
         assert part.all.fitted == pytest.approx(1e3 * np.sqrt(np.mean(np.square(data["rms"]))))

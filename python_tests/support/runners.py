@@ -94,7 +94,7 @@ def packed(text: str) -> Path:
     folder = Path(tempfile.mkdtemp(prefix="tendonfmu-tests-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     (folder / "finger.json").write_text(text, encoding="utf-8")
-    fmu: Path = product("fmu.packaging").build_fmu(folder / "finger.json", folder / "finger.fmu", illustrated=False)
+    fmu: Path = product("fmu.packaging").build_fmu(folder / "finger.json", folder / "finger.fmu")
     return fmu
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from tendonfmu.detect import ContactTuning, Scored, tune_report
 from tendonfmu.diagnosis import Diagnosis, Event
 from tendonfmu.recordings import FitRecording
-from tendonfmu.report import cards_of, names_of
+from tendonfmu.report import capital, gain_text, names_of
 
 MOST_SAID = 2  # stretches that are named one by one
 BEFORE, AFTER, POINTS = 0.5, 1.0, 1000  # s around a push that is shown, and samples of it at most
@@ -44,10 +44,19 @@ OF_PUSH = ("onset_s", "end_s", "largest_torque", "joint", "found", "at_release",
 
 def structure_of(found: Diagnosis) -> dict[str, Any]:
     """Report what the description lacked, with both models."""
-    shown = ("title", "place", "size", "gain", "explanation")
+    names = names_of(found)
     return {
         "verdict": found.verdict,
-        "causes": [{key: card[key] for key in shown} for card in cards_of(found, names_of(found))[: len(found.causes)]],
+        "causes": [
+            {
+                "title": capital(cause.title),
+                "place": capital(names.places(cause)),
+                "size": cause.size,
+                "gain": gain_text(found, cause),
+                "explanation": cause.explanation,
+            }
+            for cause in found.causes
+        ],
         "recordings": [Path(each).name for each in found.recordings],
         "tests": [Path(each).name for each in found.tests],
         "unexplained": found.unexplained.description,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -11,14 +10,13 @@ from typing import Any, NamedTuple
 from tendonfmu.calibration.calibration import DIAGNOSIS, Calibration
 from tendonfmu.detect import tune_report
 from tendonfmu.drawing import Sheet
-from tendonfmu.files import check_output, check_output_folder, counted, whole_file, write_text
+from tendonfmu.files import check_output_folder, counted, report_text, whole_file, write_text
 from tendonfmu.fmu import build_fmu
 from tendonfmu.model import description_text
 from tendonfmu.report import (
     Row,
     Table,
     capital,
-    drawn,
     friction_figure,
     motion_sheet,
     push_sheet,
@@ -311,10 +309,7 @@ def files_of(report: Mapping[str, Any]) -> dict[str, str]:
 
 def check_folder(folder: Path, inputs: Sequence[Path]) -> None:
     """Check that the results can be written, before a long computation."""
-    check_output_folder(folder)
-    if folder.is_dir():
-        for name in (FINGER, FMU, PAGE, REPORT):
-            check_output(folder / name, *inputs)
+    check_output_folder(folder, (FINGER, FMU, PAGE, REPORT), inputs)
 
 
 def write_calibration(calibration: Calibration, folder: Path) -> dict[Path, str]:
@@ -325,9 +320,7 @@ def write_calibration(calibration: Calibration, folder: Path) -> dict[Path, str]
     write_text(folder / PAGE, calibration_page(calibration))
     written = files_of(calibration.report)
     _write_diagnosis(calibration, folder / DIAGNOSIS)
-    report = {**calibration.report, "files": list(written)}
-    text = ",\n".join(f" {json.dumps(key)}: {json.dumps(value, ensure_ascii=False)}" for key, value in report.items())
-    write_text(folder / REPORT, f"{{\n{text}\n}}\n")
+    write_text(folder / REPORT, report_text({**calibration.report, "files": list(written)}))
     return {folder / name: what for name, what in written.items()}
 
 
@@ -361,7 +354,7 @@ def calibration_page(calibration: Calibration) -> str:
     tone, sentence = verdict(report)
     return render(
         "calibration.html.jinja",
-        drawn(sheets(calibration)),
+        sheets(calibration),
         report=report,
         finger=friction_figure(calibration.data),
         tone=tone,

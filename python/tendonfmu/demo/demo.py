@@ -23,7 +23,6 @@ from tendonfmu.calibration import DIAGNOSIS
 from tendonfmu.calibration import PAGE as CALIBRATION_PAGE
 from tendonfmu.calibration import text as calibration_text
 from tendonfmu.drawing import Sheet
-from tendonfmu.errors import InputError
 from tendonfmu.estimate import ESTIMATION_MISSING, HAS_ESTIMATION
 from tendonfmu.files import check_output_folder, whole_file, write_text
 from tendonfmu.interface import CalibrateResult, build, calibrate, fit, run, score
@@ -35,10 +34,10 @@ from tendonfmu.report import (
     diagnosis_page,
     diagnosis_sheets,
     diagnosis_text,
-    drawn,
     fit_page,
     fit_text,
     law_sheets,
+    make_folder,
     render,
     residual_tables,
     rounded,
@@ -93,10 +92,7 @@ class Story:
 
     def __init__(self, folder: Path) -> None:
         check_output_folder(folder)
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(f"{folder}: cannot be made ({error.strerror})") from None
+        make_folder(folder)
         self.folder = folder
         self.names = [name for name in TITLES if HAS_ESTIMATION or name not in ESTIMATING]
         self.missing = "" if HAS_ESTIMATION else f"{', '.join(ESTIMATING)} are left out: {ESTIMATION_MISSING}"
@@ -123,7 +119,7 @@ class Story:
         sheets = [replace(sheet, section=each.name) for each in self.chapters for sheet in each.sheets]
         written = [(path.relative_to(self.folder).as_posix(), what) for path, what in self.files.items()]
         content = {"chapters": self.chapters, "missing": self.missing, "files": written}
-        write_text(page, render("story.html.jinja", drawn(sheets), **content))
+        write_text(page, render("story.html.jinja", sheets, **content))
         self.files = {page: "the whole demo, for a browser", **self.files}
 
     def report(self) -> dict[str, Any]:
@@ -184,7 +180,7 @@ class Story:
         self.files |= write_fit_page(picture, folder)
         fitted.write(folder / "fitted.json")
         self.files[folder / "fitted.json"] = "the fitted description"
-        residuals = list(residual_tables(picture))
+        residuals = residual_tables(picture.report, picture.fitted.joint_names)
         start, end = (rounded(value) for value in (residuals[-1].all.start, residuals[-1].all.fitted))
         tile = Tile(f"{start} → {end}", residuals[-1].unit, "error on an unseen recording, before and after the fit")
         sheets = [list(torque_sheets(picture))[-1]]

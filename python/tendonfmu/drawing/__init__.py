@@ -1,7 +1,7 @@
-"""Draws figures from ready-made data; computes nothing.
+"""The figures of pages and notebooks, and the picture of a finger. Draws ready-made data; computes nothing.
 
-- `panel`: what a figure shows, with its colours and sizes
-- `figures`: makes it as a Plotly figure, which pages embed; `grid`: several in one, for notebooks
+- `figures`: traces of Plotly, panels of them, sheets of panels
+- `output`: panels as JSON for a page, and as one Plotly figure for a notebook
 - `finger_picture`: draws what an FMU carries, with Pillow
 """
 
@@ -10,30 +10,37 @@ from typing import TYPE_CHECKING
 from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from .figures import dark_colours, figures_json, figures_of, packed_plotly
-    from .finger_picture import draw_finger, draw_terminal
-    from .grid import SeriesRow, series_figure, sheets_figure
-    from .panel import (
+    from .figures import (
         BLUE,
+        COLOURS,
         DARK,
         DIVERGING,
         GREEN,
         GREY,
-        IN_DARK,
         LIGHT,
         ORANGE,
+        PURPLE,
+        SAND,
+        SILVER,
+        SKIN,
         SKY,
-        STYLES,
         VERMILION,
-        Band,
-        Bars,
-        Curve,
-        Dots,
-        Heat,
         Interval,
         Panel,
         Sheet,
-        line_of,
+        Trace,
+        band,
+        bars,
+        curve,
+        dots,
+        heat,
+        histogram,
+        lane,
+        mark,
+        panel,
+        stripes,
     )
+    from .finger_picture import draw_finger, draw_terminal
+    from .output import IN_DARK, dark_colours, figures_json, packed_plotly, series_figure, sheets_figure
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -8,7 +8,7 @@ import re
 import shutil
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -45,8 +45,8 @@ def _check_place(file: Path) -> None:
         raise InputError(f"{file}: read-only; expected another name, or a file that may be written")
 
 
-def check_output_folder(folder: Path) -> None:
-    """Check that a folder can be made, if it does not exist, and be written to."""
+def check_output_folder(folder: Path, names: Iterable[str] = (), inputs: Sequence[Path] = ()) -> None:
+    """Check that a folder can be made, if it does not exist, and be written to, and that files in it are no inputs."""
     if folder.name == "-":
         raise InputError("-: standard output takes tables only; expected the name of a folder")
     there = next(each for each in (folder, *folder.absolute().parents) if each.exists())
@@ -54,6 +54,9 @@ def check_output_folder(folder: Path) -> None:
         what = "a file" if there == folder else f"{there} is a file"
         raise InputError(f"{folder}: {what}; expected a folder, or a name for one")
     _check_writable(folder, there)
+    if folder.is_dir():
+        for name in names:
+            check_output(folder / name, *inputs)
 
 
 def _check_writable(output: Path, folder: Path) -> None:

@@ -14,18 +14,16 @@ if TYPE_CHECKING:
     from .model_variables import NOT_IN_XML, VariableTable, elements, group_sizes, read_table, units_of
     from .packaging import (
         build_fmu,
-        draw_pictures,
         find_binaries,
         fmu_report,
         guid,
+        illustrations,
         licenses,
         members,
         model_description,
         model_identifier,
         pack,
         package_file,
-        render_documentation,
-        terminals_and_icons,
     )
     from .parameter_set import SetParameter, check_parameter_set_path, parameter_sets, write_parameter_set
     from .reference_results import bridged_rows, reference_run, related_members

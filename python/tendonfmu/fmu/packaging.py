@@ -81,7 +81,6 @@ def build_fmu(
     output_path: Path,
     *,
     binaries: Path | None = None,
-    illustrated: bool = True,
     extra: Mapping[str, bytes] | None = None,
     fmi: int = 2,
     at_end: bool = False,
@@ -91,7 +90,6 @@ def build_fmu(
     content = members(
         read_finger(finger),
         binaries=binaries,
-        illustrated=illustrated,
         fmi=fmi,
         at_end=at_end,
         experiment=experiment,
@@ -122,7 +120,6 @@ def members(
     description: Finger,
     *,
     binaries: Path | None = None,
-    illustrated: bool = True,
     fmi: int = 2,
     at_end: bool = False,
     experiment: Mapping[str, float] | None = None,
@@ -152,13 +149,7 @@ def members(
         "resources/model.image": description.image,
         "resources/finger.json": description.text,
     }
-    icon = None
-    if illustrated:
-        pictures, icon = draw_pictures(description)
-        content |= pictures
-        page = render_documentation("documentation.html.jinja", context, summary=count(description))
-        content["documentation/index.html"] = page.encode()
-    content |= terminals_and_icons(context["variables"], icon)
+    content |= illustrations(description, "documentation.html.jinja", context)
     content |= licenses("license.txt")
     content |= {f"sources/{name}": data for name, data in sources.items()}
     if fmi == 3:
@@ -168,23 +159,21 @@ def members(
     return content
 
 
-def draw_pictures(finger: Finger) -> tuple[dict[str, bytes], bytes]:
-    """Draw a finger for the root of an FMU."""
+def illustrations(finger: Finger, template: str, model: Mapping[str, Any], **context: Any) -> dict[str, bytes]:
+    """Return the HTML page of an FMU, its icon for importers of FMI 2, and its folder `terminalsAndIcons`."""
     from tendonfmu.drawing import draw_finger
-    from tendonfmu.model import finger_drawing
+    from tendonfmu.model import finger_drawing, finger_svg, keys_of
 
-    picture, icon = io.BytesIO(), io.BytesIO()
-    draw_finger(finger_drawing(finger.data), picture, icon)
-    return {"model.png": picture.getvalue()}, icon.getvalue()
-
-
-def render_documentation(template: str, model: Mapping[str, Any], **context: Any) -> str:
-    """Render the HTML page of an FMU."""
     by_causality = {
         f"{causality}s": [variable for variable in model["variables"] if variable["causality"] == causality]
         for causality in ("input", "output", "parameter")
     }
-    return html_template(template).render(model=model, **by_causality, **context)
+    drawing = finger_drawing(finger.data)
+    routing = {"drawing": finger_svg(drawing), "keys": list(keys_of(drawing)), "summary": count(finger)}
+    page = html_template(template).render(model=model, **by_causality, **routing, **context)
+    icon = draw_finger(drawing)
+    files = {"model.png": icon, "documentation/index.html": page.encode()}
+    return files | terminals_and_icons(model["variables"], icon)
 
 
 # --- parts -----------------------------------------------------------------------------------------------------------
@@ -301,29 +290,24 @@ def _variables(model: ElementTree.Element) -> Iterator[tuple[str | None, int]]:
 # `sensors`.
 
 
-def terminals_and_icons(variables: Sequence[Mapping[str, Any]], icon: bytes | None) -> dict[str, bytes]:
+def terminals_and_icons(variables: Sequence[Mapping[str, Any]], icon: bytes) -> dict[str, bytes]:
     """Return the folder `terminalsAndIcons` of an FMU."""
     from lxml import etree
     from lxml.builder import ElementMaker
+
+    from tendonfmu.drawing import draw_terminal
 
     groups: dict[str, list[Mapping[str, Any]]] = {}
     for variable in variables:
         if variable.get("terminal"):
             groups.setdefault(variable["terminal"], []).append(variable)
     sides = {name: members[0]["causality"] for name, members in groups.items()}
-    files = {}
-    if icon is not None:
-        from tendonfmu.drawing import draw_terminal
-
-        files["icon.png"] = icon
-        for side in sorted(set(sides.values())):
-            picture = io.BytesIO()
-            draw_terminal(picture, is_input=side == "input")
-            files[f"{side}.png"] = picture.getvalue()
+    files = {f"{side}.png": draw_terminal(is_input=side == "input") for side in sorted(set(sides.values()))}
+    files["icon.png"] = icon
     e = ElementMaker()
     root = e.fmiTerminalsAndIcons(
-        *([_graphical_representation(e)] if files else []),
-        e.Terminals(*(_terminal(e, name, members, sides, drawn=bool(files)) for name, members in groups.items())),
+        _graphical_representation(e),
+        e.Terminals(*(_terminal(e, name, members, sides) for name, members in groups.items())),
         fmiVersion="3.0",
     )
     text = etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True)
@@ -342,19 +326,16 @@ def _graphical_representation(e: ElementMaker) -> Any:
     )
 
 
-def _terminal(
-    e: ElementMaker, name: str, members: Sequence[Mapping[str, Any]], sides: Mapping[str, str], *, drawn: bool
-) -> Any:
+def _terminal(e: ElementMaker, name: str, members: Sequence[Mapping[str, Any]], sides: Mapping[str, str]) -> Any:
     """Return a terminal; on an edge, terminals stand at equal distances from top to bottom."""
     content = [
         e.TerminalMemberVariable(variableName=member["name"], memberName=member["name"], variableKind="signal")
         for member in members
     ]
-    if drawn:
-        beside = [other for other, side in sides.items() if side == sides[name]]
-        y = EDGE - 2.0 * EDGE * (beside.index(name) + 1) / (len(beside) + 1)
-        place = _box(-EDGE if sides[name] == "input" else EDGE, y, HALF)
-        content.append(e.TerminalGraphicalRepresentation(**place, iconBaseName=sides[name]))
+    beside = [other for other, side in sides.items() if side == sides[name]]
+    y = EDGE - 2.0 * EDGE * (beside.index(name) + 1) / (len(beside) + 1)
+    place = _box(-EDGE if sides[name] == "input" else EDGE, y, HALF)
+    content.append(e.TerminalGraphicalRepresentation(**place, iconBaseName=sides[name]))
     # bus: members of the same name are connected, and either side may have more
     return e.Terminal(*content, name=name, matchingRule="bus", description=TERMINAL_DESCRIPTIONS[name])
 

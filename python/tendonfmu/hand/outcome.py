@@ -12,7 +12,7 @@ from typing import Any
 from tendonfmu.calibration import FINGER
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import check_given_once
-from tendonfmu.files import check_output, check_output_folder, write_text
+from tendonfmu.files import check_output_folder, write_text
 from tendonfmu.hand.description import Hand, is_hand, read_hand, with_descriptions
 from tendonfmu.hand.page import PAGE, verdict, write_hand_page
 from tendonfmu.hand.parts import (
@@ -108,10 +108,7 @@ def _check(hand: Hand, groups: Groups, folder: Path, roles: tuple[str, str], nam
     first, second, third = groups
     check_given_once(first, second, roles[0])
     check_given_once([*first, *second], third, roles[1])
-    check_output_folder(folder)
-    if folder.is_dir():
-        for name in names:
-            check_output(folder / name, *hand.files, *first, *second, *third)
+    check_output_folder(folder, names, [*hand.files, *first, *second, *third])
 
 
 def _finished(

@@ -9,14 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from tendonfmu.detect import ContactTuning, Scored, score_recordings, score_report, tune_report
 from tendonfmu.files import counted, report_text, write_text
 from tendonfmu.model import Finger, FingerSource
 from tendonfmu.options import ScoreOptions, TuneOptions
 from tendonfmu.recordings import RecordingSource, flagged_stretches
-from tendonfmu.report import detect_text, html_of
+from tendonfmu.report import detect_text, html_of, tail_sheet
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -66,12 +64,9 @@ class TuneResult:
         plotly.graph_objects.Figure
             The chosen bounds have the factor 1.
         """
-        from tendonfmu.drawing import SeriesRow, series_figure  # plotly takes 0.1 s to import
+        from tendonfmu.drawing import sheets_figure
 
-        tail = self.report["tail"]
-        alarms, factors = (np.array([point[name] for point in tail]) for name in ("per_hour", "factor"))
-        row = SeriesRow("alarms (1/h)", {"kept out": alarms})
-        return series_figure(repr(self)[1:-1], "factor on all bounds", factors, [row])
+        return sheets_figure(repr(self)[1:-1], [tail_sheet(self.tuning)])
 
     def _repr_html_(self) -> str:
         tables, lines = detect_text.tune_tables(self.tuning), detect_text.tune_lines(self.tuning)
@@ -193,18 +188,17 @@ class ScoreResult:
         plotly.graph_objects.Figure
             A row per joint. Labels are shaded grey, alarms orange.
         """
-        from tendonfmu.drawing import GREY, ORANGE, SeriesRow, series_figure
+        from tendonfmu.drawing import GREY, ORANGE, series_figure
 
         track = self.scored.tracks[recording]
         time, torque = track.recording.time, track.outputs["compensated_torque"]
-        rows = []
-        for j in range(torque.shape[1]):
-            curves = {"compensated": torque[:, j]}
-            if track.external is not None:
-                curves["sensor"] = track.external[:, j]
-            rows.append(SeriesRow(f"joint {j + 1} (N·m)", curves))
-        shaded = {GREY: flagged_stretches(time, track.label), ORANGE: flagged_stretches(time, track.alarm)}
-        return series_figure(f"{track.recording.path}", "time (s)", time, rows, shaded)
+        rows = {f"joint {j + 1} (N·m)": {"compensated": torque[:, j]} for j in range(torque.shape[1])}
+        if track.external is not None:
+            for curves, external in zip(rows.values(), track.external.T, strict=True):
+                curves["sensor"] = external
+        shaded = {("label", GREY): track.label, ("alarm", ORANGE): track.alarm}
+        stretches = {name: flagged_stretches(time, flags) for name, flags in shaded.items()}
+        return series_figure(str(track.recording.path), "time (s)", time, rows, stretches)
 
     def _repr_html_(self) -> str:
         tables, lines = detect_text.score_tables(self.scored), detect_text.score_lines(self.scored)

@@ -109,7 +109,7 @@ class Diagnosis:
         plotly.graph_objects.Figure
             The figures of diagnosis.html.
         """
-        from tendonfmu.drawing import sheets_figure  # plotly takes 0.1 s to import
+        from tendonfmu.drawing import sheets_figure
 
         sheets = [sheet for sheet in diagnosis_sheets(self.found) if residuals or sheet.section != "views"]
         return sheets_figure(repr(self)[1:-1], sheets)

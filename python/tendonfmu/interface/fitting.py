@@ -128,7 +128,7 @@ class FitResult:
         plotly.graph_objects.Figure
             The figures of `tendonfmu fit --figures` of these kinds.
         """
-        from tendonfmu.drawing import sheets_figure  # plotly takes 0.1 s to import
+        from tendonfmu.drawing import sheets_figure
         from tendonfmu.report import law_sheets, torque_sheets
 
         picture = self.estimator.picture()

@@ -76,17 +76,15 @@ class RunResult:
         plotly.graph_objects.Figure
             A row per joint. Contacts that the finger reports are shaded.
         """
-        from tendonfmu.drawing import ORANGE, SeriesRow, series_figure  # plotly takes 0.1 s to import
+        from tendonfmu.drawing import ORANGE, series_figure
 
-        outputs = self.outputs
-        names = {"joint_torque": "pulled", "friction_torque": "friction", "compensated_torque": "compensated"}
-        rows = [
-            SeriesRow(f"joint {j + 1} (N·m)", {short: outputs[name][:, j] for name, short in names.items()})
+        outputs, names = self.outputs, {"pulled": "joint", "friction": "friction", "compensated": "compensated"}
+        rows = {
+            f"joint {j + 1} (N·m)": {short: outputs[f"{name}_torque"][:, j] for short, name in names.items()}
             for j in range(outputs["joint_torque"].shape[1])
-        ]
-        time = outputs["time"]
-        found = {ORANGE: flagged_stretches(time, outputs["contact"])}
-        return series_figure(f"{self.recording.path}", "time (s)", time, rows, found)
+        }
+        contact = {("contact", ORANGE): flagged_stretches(outputs["time"], outputs["contact"])}
+        return series_figure(str(self.recording.path), "time (s)", outputs["time"], rows, contact)
 
     def _repr_html_(self) -> str:
         headings = ("output", "mean", "least", "largest")

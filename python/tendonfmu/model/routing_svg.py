@@ -26,6 +26,7 @@ from tendonfmu.model.routing_geometry import (
 ALONG, ACROSS = 32.0, 46.0  # per unit of the drawing
 ROW = 14.0  # of names of joints
 LETTER = 7.0  # width of a letter of a name
+GREY = "#8A8A8A"
 LONGEST = 14  # letters of a name that are shown
 SHOWN = 1.25  # times as large on a page
 MARK = 8.0  # radius of a mark
@@ -65,6 +66,20 @@ def finger_svg(drawing: FingerDrawing, marks: Iterable[Mark] = ()) -> Markup:
         red=EDGE_RED,
     )
     return Markup(text)
+
+
+def keys_of(drawing: FingerDrawing) -> Iterator[tuple[str, str, str]]:
+    """Yield the marks of a finger: CSS class, colour, meaning."""
+    tendons = drawing.tendons
+    yield "square", GREY, "end of a tendon"
+    if any(len(tendon.pulleys) for tendon in tendons):
+        yield "ring", GREY, "pulley with friction"
+    if any(len(tendon.edges) for tendon in tendons):
+        yield "ring", EDGE_RED, "edge with friction"
+    if any(len(tendon.varying_edges) for tendon in tendons):
+        yield "dot", EDGE_RED, "edge whose friction varies with the angle"
+    if any(tendon.bidirectional for tendon in tendons):
+        yield "dashed", GREY, "cable loop"
 
 
 def finger_html(lines: Sequence[str], data: Data) -> str:

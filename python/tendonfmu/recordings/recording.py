@@ -215,17 +215,16 @@ class Recording:
         plotly.graph_objects.Figure
             A row per group of signals. Samples labelled as contact are shaded.
         """
-        from tendonfmu.drawing import SeriesRow, series_figure
+        from tendonfmu.drawing import ORANGE, series_figure
 
-        rows = [
-            SeriesRow(
-                f"{name.replace('_', ' ')} ({GROUPS[name][0].replace('.', '·')})",
-                {f"{name}[{i + 1}]": array[:, i] for i in range(array.shape[1])},
-            )
+        rows = {
+            f"{name.replace('_', ' ')} ({GROUPS[name][0].replace('.', '·')})": {
+                f"{name}[{i + 1}]": array[:, i] for i in range(array.shape[1])
+            }
             for name, array in self.groups.items()
-        ]
-        labelled = {} if self.contact is None else {"#E69F00": flagged_stretches(self.time, self.contact)}
-        return series_figure(str(self.path), "time (s)", self.time, rows, labelled)
+        }
+        labelled = [] if self.contact is None else flagged_stretches(self.time, self.contact)
+        return series_figure(str(self.path), "time (s)", self.time, rows, {("contact", ORANGE): labelled})
 
     def _repr_html_(self) -> str:
         from html import escape

@@ -15,8 +15,7 @@ if TYPE_CHECKING:
     from .calibration_figures import MotionShown, PushShown, motion_sheet, push_sheet, pushes_sheet
     from .diagnosis_figures import diagnosis_sheets
     from .diagnosis_files import REPORT, build_report, check_folder, write_diagnosis
-    from .diagnosis_page import cards_of, waterfall_of
-    from .diagnosis_text import confusion_sentence, error_sentence, left_sentence, names_of, unit_of
+    from .diagnosis_text import confusion_sentence, error_sentence, gain_text, left_sentence, names_of, unit_of
     from .fit_figures import torque_sheets
     from .fit_laws import law_sheets
     from .fit_page import write_fit_page
@@ -24,10 +23,10 @@ if TYPE_CHECKING:
     from .history import headline, history_report, rows_of_lines, trend_sentence, write_history
     from .marked_finger import friction_figure
     from .numbers import Row, Table, capital, column, html_of, percent, rms, rounded, together
-    from .page import Tile, drawn, render, write_figures
+    from .page import Tile, make_folder, render, write_figures
     from .rerun_recording import check_rerun, write_rerun
     from .run_page import check_page, run_report, run_sheets, write_run_page
     from .score_figures import score_sheets, write_score_figures
-    from .tune_figures import write_tune_figures
+    from .tune_figures import tail_sheet, write_tune_figures
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.arrays import Numbers
-from tendonfmu.drawing import Curve, Panel, Sheet, line_of
+from tendonfmu.drawing import BLUE, DARK, GREY, SAND, VERMILION, Sheet, curve, lane, mark, panel, stripes
 from tendonfmu.report.numbers import rms, rounded, torque_unit
 
 VISIBLE = 0.003  # of the longest recording: shorter alarms are drawn so long
@@ -46,31 +46,27 @@ def motion_sheet(shown: MotionShown, joints: list[str], given: str) -> Sheet:
     panels = []
     for j, joint in enumerate(joints):
         before, after = (rounded(factor * rms(left[:, j])) for left in (shown.before, shown.after))
-        curves = (("measured", shown.torque), ("before", shown.before), ("after", shown.after))
         panels.append(
-            Panel(
-                title=joint,
-                note=f"left: {before} → {after} {unit} rms",
-                alt=f"Joint {joint}: torque of the tendons, and what is left of it: {before} {unit} rms with {given}, "
+            panel(
+                joint,
+                f"Joint {joint}: torque of the tendons, and what is left of it: {before} {unit} rms with {given}, "
                 f"{after} {unit} calibrated.",
-                x_label="time (s)",
-                y_label=f"torque ({unit})",
+                "time (s)",
+                f"torque ({unit})",
+                curve(shown.time, factor * shown.torque[:, j], "torque of the tendons", DARK, 1.0),
+                curve(shown.time, factor * shown.before[:, j], f"left of it with {given}", VERMILION, 1.0, alpha=0.9),
+                curve(shown.time, factor * shown.after[:, j], "left of it, calibrated", BLUE, 1.0),
+                note=f"left: {before} → {after} {unit} rms",
                 size="medium",
-                curves=tuple(Curve(style, shown.time, factor * values[:, j]) for style, values in curves),
                 zoom="motion",
             )
         )
     return Sheet(
-        section="motion",
-        name="motion",
-        title=f"{shown.recording}, {shown.time[0]:.0f} to {shown.time[-1]:.0f} s",
-        keys=(
-            ("measured", "torque of the tendons"),
-            ("before", f"left of it with {given}"),
-            ("after", "left of it, calibrated"),
-        ),
-        panels=panels,
-        caption="A stretch with a typical error; nothing was tuned on it. What is left is the torque that the finger "
+        "motion",
+        "motion",
+        f"{shown.recording}, {shown.time[0]:.0f} to {shown.time[-1]:.0f} s",
+        panels,
+        "A stretch with a typical error; nothing was tuned on it. What is left is the torque that the finger "
         "reports although nothing touches it.",
     )
 
@@ -78,61 +74,48 @@ def motion_sheet(shown: MotionShown, joints: list[str], given: str) -> Sheet:
 def push_sheet(shown: PushShown) -> Sheet:
     """Draw what is felt at a joint while it is pushed, and when contact is reported."""
     factor, unit = torque_unit(float(np.max(np.abs(shown.felt))))
-    time, curves = 1e3 * np.asarray(shown.time), [("after", shown.felt)]
-    if shown.sensor is not None:
-        curves.insert(0, ("measured", shown.sensor))
-    panel = Panel(
-        title=shown.joint,
-        note=f"contact reported after {1e3 * shown.delay:.0f} ms",
-        alt=f"Joint {shown.joint}: the torque felt during a push; contact is reported {1e3 * shown.delay:.0f} ms after "
-        "its onset.",
-        x_label="time from the onset (ms)",
-        y_label=f"torque ({unit})",
+    time, delay = 1e3 * np.asarray(shown.time), 1e3 * shown.delay
+    felt = "torque felt: the torque that the tendons have to hold, less friction"
+    drawn = panel(
+        shown.joint,
+        f"Joint {shown.joint}: the torque felt during a push; contact is reported {delay:.0f} ms after its onset.",
+        "time from the onset (ms)",
+        f"torque ({unit})",
+        [] if shown.sensor is None else curve(time, factor * np.asarray(shown.sensor), "reference sensor", DARK, 1.0),
+        curve(time, factor * np.asarray(shown.felt), felt, BLUE, 1.0),
+        stripes([(0.0, 1e3 * shown.end)], "pushed, as labelled", SAND, 0.3),
+        mark(delay),
+        note=f"contact reported after {delay:.0f} ms",
         size="wide",
-        curves=tuple(Curve(style, time, factor * np.asarray(values)) for style, values in curves),
-        stripes={"label_stripe": [(0.0, 1e3 * shown.end)]},
-        line=1e3 * shown.delay,
     )
-    keys = [("after", "torque felt: the torque that the tendons have to hold, less friction")]
-    keys += [("measured", "reference sensor")] if shown.sensor is not None else []
-    return Sheet(
-        section="push",
-        name="push",
-        title=f"{shown.recording}, at {shown.onset:.1f} s",
-        keys=(*keys, ("label_stripe", "pushed, as labelled")),
-        panels=[panel],
-        caption="The push with the median delay of those that are found. The line is where contact is reported.",
-    )
+    caption = "The push with the median delay of those that are found. The line is where contact is reported."
+    return Sheet("push", "push", f"{shown.recording}, at {shown.onset:.1f} s", [drawn], caption)
 
 
 def pushes_sheet(pushes: Sequence[Mapping[str, Any]], alarms: Sequence[Mapping[str, Any]]) -> Sheet:
     """Draw when pushes were found and missed, and false alarms, a row per recording."""
     names = list(dict.fromkeys(each["recording"] for each in pushes))
-    kinds = {
-        "alarm": ("push, found", [each for each in pushes if each["found"]], "onset_s"),
-        "missed": ("push, missed", [each for each in pushes if not each["found"]], "onset_s"),
-        "false_alarm": ("alarm without a push", list(alarms), "begin_s"),
-    }
+    kinds = (
+        ("push, found", BLUE, [each for each in pushes if each["found"]], "onset_s"),
+        ("push, missed", GREY, [each for each in pushes if not each["found"]], "onset_s"),
+        ("alarm without a push", VERMILION, list(alarms), "begin_s"),
+    )
     least = VISIBLE * max(each["end_s"] for each in pushes)
-    curves, keys = [], []
-    for style, (meaning, stretches, begin) in kinds.items():
+    lanes = []
+    for meaning, colour, stretches, begin in kinds:
         for row, name in enumerate(names):
-            spans = [
-                (each[begin], max(each["end_s"], each[begin] + least))
-                for each in stretches
-                if each["recording"] == name
-            ]
-            curves += [Curve(style, *line_of(spans, row))] if spans else []
-        keys += [(style, meaning)] if stretches else []
-    panel = Panel(
-        title="Pushes and false alarms",
-        alt="When pushes were found and missed, and when there was an alarm without a push",
-        x_label="time (s)",
-        y_label="",
+            here = [each for each in stretches if each["recording"] == name]
+            spans = [(each[begin], max(each["end_s"], each[begin] + least)) for each in here]
+            lanes += [lane(spans, row, meaning, colour)] if spans else []
+    drawn = panel(
+        "Pushes and false alarms",
+        "When pushes were found and missed, and when there was an alarm without a push",
+        "time (s)",
+        "",
+        *lanes,
         size="wide",
         height=100 + 36 * len(names),
-        curves=tuple(curves),
-        rows=tuple(names),
+        rows=names,
         zoom="pushes",
     )
-    return Sheet("pushes", "pushes", "All pushes", keys, [panel])
+    return Sheet("pushes", "pushes", "All pushes", [drawn])

@@ -1,16 +1,33 @@
-"""What the figures of a diagnosis show: sheets of panels (`drawing/panel.py`), ready to be drawn."""
+"""The figures of a diagnosis: evidence for each cause, and what is left at each joint."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis import Cause, Diagnosis, Evidence, Names, ResidualView, at_place
-from tendonfmu.drawing import DIVERGING, Band, Bars, Curve, Dots, Heat, Panel, Sheet
+from tendonfmu.drawing import (
+    BLUE,
+    DARK,
+    DIVERGING,
+    GREY,
+    VERMILION,
+    Interval,
+    Panel,
+    Sheet,
+    Trace,
+    band,
+    bars,
+    curve,
+    dots,
+    heat,
+    panel,
+)
 from tendonfmu.files import counted
 from tendonfmu.report.diagnosis_text import names_of, unit_of
 from tendonfmu.report.diagnosis_words import Words, words_of
@@ -28,14 +45,6 @@ _TITLES = {
     "autocorrelation": "Autocorrelation",
 }
 _BINNED = ("angle", "velocity", "tendon_force", "load", "travel")
-_STYLES = ("before", "after")
-_CAUSE_KEYS = (("before_dots", "without it"), ("after_dots", "with it"), ("after", "95 % interval of the mean"))
-_CHANGE_KEYS = (
-    ("reference_dots", "then, in the reference"),
-    ("before_dots", "now"),
-    ("after_dots", "now, with the change in the model"),
-    ("after", "95 % interval of the mean"),
-)
 _ROOM = 3.0  # times the largest mean: the y axis shows no more of the scatter, so that the means stay visible
 
 
@@ -63,16 +72,16 @@ def _map_sheets(diagnosis: Diagnosis, names: Names) -> Iterator[Sheet]:
     joint, (one, two) = names.joint(shown.joint), shown.labels
     x, y = (0.5 * (edges[1:] + edges[:-1]) for edges in shown.edges)
     title = f"What remains at {joint}, over {one.split(' (')[0]} and {two.split(' (')[0]}"
-    panel = Panel(
-        title="Mean residual of the extended model" if diagnosis.torque_causes else "Mean residual",
-        alt=f"{title}, from {-most:.2g} to {most:.2g} {unit}",
-        x_label=one,
-        y_label=two,
+    drawn = panel(
+        "Mean residual of the extended model" if diagnosis.torque_causes else "Mean residual",
+        f"{title}, from {-most:.2g} to {most:.2g} {unit}",
+        one,
+        two,
+        heat(torque, x, y, DIVERGING, (-most, most), unit),
         note=f"blue −{most:.2g}, red +{most:.2g} {unit}",
-        heat=Heat(torque, x, y, DIVERGING, -most, most, unit),
     )
     caption = "One colour in a whole region is a torque that comes back there each time. Cells without data are empty."
-    yield Sheet(section="views", name="views_map", title=title, caption=caption, keys=(), panels=(panel,))
+    yield Sheet("views", "views_map", title, [drawn], caption)
 
 
 # --- evidence for a cause ---------------------------------------------------------------------------------------------
@@ -80,15 +89,10 @@ def _map_sheets(diagnosis: Diagnosis, names: Names) -> Iterator[Sheet]:
 
 def _cause_sheet(diagnosis: Diagnosis, names: Names, number: int, cause: Cause) -> Sheet:
     factor, unit = unit_of(diagnosis)
-    panels = tuple(_evidence_panel(evidence, names, factor, unit) for evidence in cause.evidence)
-    return Sheet(
-        section=f"cause_{number}",
-        name=f"cause_{number}",
-        title=f"{number}. {at_place(capital(cause.title), cause.where, names)}",
-        caption="",
-        keys=_CHANGE_KEYS if cause.changed else _CAUSE_KEYS,
-        panels=(*_same_scale(panels), *_by_recording(diagnosis, cause)),
-    )
+    limits = _same_scale(cause.evidence, factor)
+    panels = [_evidence_panel(each, names, (factor, unit), limits, bool(cause.changed)) for each in cause.evidence]
+    title = f"{number}. {at_place(capital(cause.title), cause.where, names)}"
+    return Sheet(f"cause_{number}", f"cause_{number}", title, [*panels, *_by_recording(diagnosis, cause)])
 
 
 def _by_recording(diagnosis: Diagnosis, cause: Cause) -> Iterator[Panel]:
@@ -100,36 +104,51 @@ def _by_recording(diagnosis: Diagnosis, cause: Cause) -> Iterator[Panel]:
     x = np.arange(1.0, len(changed.by) + 1.0)
     value, low, high = with_ends(changed.by, factor)
     then = np.full(2, factor * changed.reference.value)
-    yield Panel(
-        title="In each of the new recordings",
-        alt=f"Size of this change in each of {counted(len(changed.by), 'new recording')}, in their order",
-        x_label="new recording, in the order given",
-        y_label=f"{changed.number.replace('_', ' ')} ({unit})",
-        curves=(Curve("after_line", x, value), Curve("start", np.array([1.0, x[-1]]), then)),
-        bars=(Bars("after", x, low, high),),
-        dots=(Dots("after_dots", x, value),),
-        ticks=tuple((float(k), str(int(k))) for k in x) if len(x) <= 12 else (),
+    yield panel(
+        "In each of the new recordings",
+        f"Size of this change in each of {counted(len(changed.by), 'new recording')}, in their order",
+        "new recording, in the order given",
+        f"{changed.number.replace('_', ' ')} ({unit})",
+        bars(x, low, high, "", BLUE, 1.0),
+        curve(x, value, "", BLUE, 0.9, alpha=0.45),
+        curve([1.0, x[-1]], then, "", GREY, 1.1, "dash"),
+        dots(x, value),
+        x_ticks=[(float(k), str(int(k))) for k in x] if len(x) <= 12 else (),
     )
 
 
-def _evidence_panel(evidence: Evidence, names: Names, factor: float, unit: str) -> Panel:
-    shown = [("before", evidence.before, evidence.before_std), ("after", evidence.after, evidence.after_std)]
-    if evidence.reference is not None and evidence.reference_std is not None:
-        shown.append(("reference", evidence.reference, evidence.reference_std))
+def _evidence_panel(
+    evidence: Evidence, names: Names, scale: tuple[float, str], limits: Interval | None, changed: bool
+) -> Panel:
+    factor, unit = scale
+    words = ("now", "now, with the change in the model") if changed else ("without it", "with it")
+    shown = zip((*words, "then, in the reference"), (VERMILION, BLUE, DARK), _means_of(evidence), strict=False)
     x, x_unit = (factor * evidence.coordinate, unit) if evidence.unit == "N·m" else (evidence.coordinate, evidence.unit)
-    return Panel(
-        title=f"Residual at {names.joint(evidence.joint)}",
-        alt=f"Mean residual at {names.joint(evidence.joint)} over {evidence.label}, without and with this in the model",
-        x_label=f"{evidence.label} ({x_unit})",
-        y_label=f"residual ({unit})",
-        curves=tuple(Curve(f"{style}_line", x, factor * mean) for style, mean, _ in shown),
-        bars=tuple(
-            Bars(style, x, factor * (mean - TWO_SIDED * std), factor * (mean + TWO_SIDED * std))
-            for style, mean, std in shown
-        ),
-        dots=tuple(Dots(f"{style}_dots", x, factor * mean) for style, mean, _ in shown),
+    intervals, lines, points = list[Trace](), list[Trace](), list[Trace]()
+    for name, colour, (low, mean, high) in shown:
+        interval = "95 % interval of the mean" if colour == BLUE else ""
+        intervals += bars(x, factor * low, factor * high, interval, colour, 1.2)
+        lines.append(curve(x, factor * mean, "", colour, 0.9, alpha=0.45))
+        points.append(dots(x, factor * mean, name, colour))
+    return panel(
+        f"Residual at {names.joint(evidence.joint)}",
+        f"Mean residual at {names.joint(evidence.joint)} over {evidence.label}, without and with this in the model",
+        f"{evidence.label} ({x_unit})",
+        f"residual ({unit})",
+        intervals,
+        lines,
+        points,
+        y_limits=limits,
         near_x=_near(evidence.coordinate) if evidence.label.startswith("travel") else 0.0,
     )
+
+
+def _means_of(evidence: Evidence) -> Iterator[tuple[Numbers, Numbers, Numbers]]:
+    """Yield 95 % interval and mean, (low, mean, high): without the cause, with it, and in the reference."""
+    pairs = [(evidence.before, evidence.before_std), (evidence.after, evidence.after_std)]
+    if evidence.reference is not None and evidence.reference_std is not None:
+        pairs.append((evidence.reference, evidence.reference_std))
+    yield from ((mean - TWO_SIDED * std, mean, mean + TWO_SIDED * std) for mean, std in pairs)
 
 
 def _near(travel: Numbers) -> float:
@@ -138,14 +157,12 @@ def _near(travel: Numbers) -> float:
     return float(np.quantile(size, 0.25)) if len(size) else 0.0
 
 
-def _same_scale(panels: Sequence[Panel]) -> tuple[Panel, ...]:
-    """Give all panels the limits of the widest, so that they can be compared."""
-    ends = [end for panel in panels for bars in panel.bars for end in (*bars.low, *bars.high) if math.isfinite(end)]
-    if not ends:
-        return tuple(panels)
-    margin = 0.06 * (max(ends) - min(ends)) or 1.0
-    limits = (min(ends) - margin, max(ends) + margin)
-    return tuple(replace(panel, y_limits=limits) for panel in panels)
+def _same_scale(evidence: Sequence[Evidence], factor: float) -> Interval | None:
+    """Return the y limits of several panels, so that they can be compared."""
+    ends = [factor * end for each in evidence for low, _, high in _means_of(each) for end in (*low, *high)]
+    ends = [end for end in ends if math.isfinite(end)]
+    margin = 0.06 * (max(ends) - min(ends)) or 1.0 if ends else 0.0
+    return (min(ends) - margin, max(ends) + margin) if ends else None
 
 
 # --- the residual of a joint ------------------------------------------------------------------------------------------
@@ -171,22 +188,9 @@ def _joint_sheet(diagnosis: Diagnosis, names: Names, joint: int, views: Sequence
     if not diagnosis.torque_causes:  # the extended model is the nominal one
         views = [replace(view, after=np.full_like(view.after, math.nan)) for view in views]
     limits = _shared_limits([view for view in views if view.kind in _BINNED], factor)
-    return Sheet(
-        section="views",
-        name=f"residual_{joint}",
-        title=f"Residual at {names.joint(joint)}",
-        caption="",
-        keys=(
-            *(_before_after(diagnosis) if diagnosis.torque_causes else _before_after(diagnosis)[:1]),
-            ("before_scatter", f"scatter within a bin, {words_of(diagnosis.kind).nominal}"),
-        ),
-        panels=tuple(_view_panel(view, names, factor, unit, limits, words_of(diagnosis.kind)) for view in views),
-    )
-
-
-def _before_after(diagnosis: Diagnosis) -> tuple[tuple[str, str], ...]:
-    words = words_of(diagnosis.kind)
-    return ("before", words.refitted), ("after", words.extended)
+    words, title = words_of(diagnosis.kind), f"Residual at {names.joint(joint)}"
+    panels = [_view_panel(view, names, factor, unit, limits, words) for view in views]
+    return Sheet("views", f"residual_{joint}", title, panels)
 
 
 def _shared_limits(views: Sequence[ResidualView], factor: float) -> tuple[float, float] | None:
@@ -206,39 +210,31 @@ def _view_panel(
 ) -> Panel:
     title = _TITLES.get(view.kind, f"Over {view.label}")
     models = f"of the {words.nominal} and of the {words.extended}"
-    panel = Panel(
-        title=title,
-        alt=f"Residual at {names.joint(view.joint)}, {title.lower()}, {models}",
-        x_label=f"{view.label} ({view.unit})" if view.unit not in ("", "1") else view.label,
-        y_label=f"residual ({unit})",
-    )
+    alt = f"Residual at {names.joint(view.joint)}, {title.lower()}, {models}"
     if view.unit == "N·m":  # all torques in one unit
         view = replace(view, x=factor * view.x, unit=unit)
-        panel = replace(panel, x_label=f"{view.label} ({unit})")
+    x_label = f"{view.label} ({view.unit})" if view.unit not in ("", "1") else view.label
+
+    def drawn(y_label: str, factor: float, *below: Trace | list[Trace], **axes: Any) -> Panel:
+        shown = view.x > 0 if view.kind == "spectrum" else slice(None)
+        before, after = (factor * values[shown] for values in (view.before, view.after))
+        lines = (
+            curve(view.x[shown], before, words.refitted, VERMILION, 1.0, alpha=0.9),
+            curve(view.x[shown], after, words.extended, BLUE, 1.0),
+        )
+        return panel(title, alt, x_label, y_label, *below, *lines, **axes)
+
     if view.kind == "spectrum":
-        return _spectrum(panel, view, factor, unit)
+        return drawn(f"power (({unit})²/Hz)", factor**2, log_x=True, log_y=True)
     if view.kind == "autocorrelation":
-        curves = (Curve("start", view.x, np.zeros_like(view.x)), *_curves(view, 1.0))
-        return replace(panel, y_label="", curves=curves, y_limits=(min(-0.25, 1.1 * _least(view)), 1.05))
+        least = min(-0.25, 1.1 * float(np.nanmin([view.before, view.after])))
+        zero = curve(view.x, np.zeros_like(view.x), "", GREY, 1.1, "dash")
+        return drawn("", 1.0, zero, y_limits=(least, 1.05))
     if view.kind not in _BINNED:
-        return replace(panel, curves=_curves(view, factor), zoom=view.kind if view.kind == "time" else "")
-    bands: tuple[Band, ...] = ()
+        return drawn(f"residual ({unit})", factor, zoom=view.kind if view.kind == "time" else "")
+    scatter: list[Trace] = []
     if view.before_std is not None:
-        low, high = view.before - view.before_std, view.before + view.before_std
-        bands = (Band("before_scatter", view.x, factor * low, factor * high),)
+        low, high = (factor * (view.before + side * view.before_std) for side in (-1, 1))
+        scatter = band(view.x, low, high, f"scatter within a bin, {words.nominal}", VERMILION, 0.13)
     near = _near(view.x) if view.kind == "travel" else 0.0
-    return replace(panel, bands=bands, curves=_curves(view, factor), y_limits=limits, near_x=near)
-
-
-def _spectrum(panel: Panel, view: ResidualView, factor: float, unit: str) -> Panel:
-    shown = view.x > 0
-    curves = tuple(replace(curve, x=curve.x[shown], y=curve.y[shown]) for curve in _curves(view, factor**2))
-    return replace(panel, y_label=f"power (({unit})²/Hz)", curves=curves, log_x=True, log_y=True)
-
-
-def _curves(view: ResidualView, factor: float) -> tuple[Curve, ...]:
-    return tuple(Curve(style, view.x, factor * getattr(view, style)) for style in _STYLES)
-
-
-def _least(view: ResidualView) -> float:
-    return float(np.nanmin([view.before, view.after]))
+    return drawn(f"residual ({unit})", factor, scatter, y_limits=limits, near_x=near)

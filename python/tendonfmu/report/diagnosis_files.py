@@ -5,7 +5,6 @@ The report is "tendonfmu-diagnosis-1" of docs/reference/commands/diagnose.md.
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 import tempfile
@@ -31,12 +30,12 @@ from tendonfmu.diagnosis import (
 )
 from tendonfmu.errors import OutputError, own_fault
 from tendonfmu.files import (
-    check_output,
     check_output_folder,
     finite,
     in_use,
     is_about,
     remove_left_behind,
+    report_text,
     write_text,
 )
 from tendonfmu.fmu import build_fmu
@@ -50,16 +49,11 @@ from tendonfmu.tasks import uninterrupted
 FORMAT = "tendonfmu-diagnosis-1"
 REPORT, NOMINAL, EXTENDED, EXTENDED_FMU = "diagnosis.json", "nominal.json", "extended.json", "extended.fmu"
 DIGITS = 6  # significant digits of the curves
-_SUFFIXES = (".html", ".json", ".fmu", ".png")  # .png: earlier versions wrote figures beside the page
-_NAMED = (REPORT, EXTENDED, EXTENDED_FMU, PAGE, NOMINAL)
 
 
 def check_folder(folder: Path, inputs: Sequence[Path]) -> None:
     """Check before a long computation that the results can be written to a folder."""
-    check_output_folder(folder)
-    if folder.is_dir():
-        for name in _NAMED:
-            check_output(folder / name, *inputs)
+    check_output_folder(folder, (REPORT, EXTENDED, EXTENDED_FMU, PAGE, NOMINAL), inputs)
 
 
 def write_diagnosis(diagnosis: Diagnosis, folder: Path) -> dict[Path, str]:
@@ -108,8 +102,7 @@ def _move(files: Iterable[Path], folder: Path, old: Path) -> None:
     old.mkdir()
     moved: list[tuple[Path, Path]] = []
     ordered = sorted(files, key=lambda file: file.name == REPORT)
-    names = {*_earlier(folder), *(file.name for file in ordered)}
-    leaving = [(folder / name, old / name) for name in sorted(names) if (folder / name).is_file()]
+    leaving = [(folder / file.name, old / file.name) for file in ordered if (folder / file.name).is_file()]
     try:
         for source, target in (*leaving, *((file, folder / file.name) for file in ordered)):
             os.replace(source, target)
@@ -129,7 +122,7 @@ def _make(diagnosis: Diagnosis, folder: Path) -> dict[Path, str]:
     added = "no cause added" if causes == 0 else "its cause added" if causes == 1 else f"its {causes} causes added"
     for name, data in ((NOMINAL, diagnosis.nominal_data), (EXTENDED, diagnosis.extended_data)):
         write_text(folder / name, description_text(dict(data)))
-    build_fmu(folder / EXTENDED, folder / EXTENDED_FMU, illustrated=False)  # drawing takes longer than all the rest
+    build_fmu(folder / EXTENDED, folder / EXTENDED_FMU)
     files = {
         folder / PAGE: "all results, to be read in a browser",
         folder / REPORT: "the same numbers",
@@ -139,16 +132,6 @@ def _make(diagnosis: Diagnosis, folder: Path) -> dict[Path, str]:
     }
     write_text(folder / REPORT, report_text(build_report(diagnosis, [file.name for file in files])))
     return files
-
-
-def _earlier(folder: Path) -> list[str]:
-    """List the files that the report of an earlier diagnosis names, including figures of causes no longer found."""
-    try:
-        listed = json.loads((folder / REPORT).read_bytes())["files"]
-    except (OSError, ValueError, KeyError, TypeError):
-        return []
-    texts = [name for name in listed if isinstance(name, str)] if isinstance(listed, list) else []
-    return [name for name in texts if Path(name).name == name and Path(name).suffix in _SUFFIXES]
 
 
 # --- the report -------------------------------------------------------------------------------------------------------
@@ -187,26 +170,6 @@ def build_report(diagnosis: Diagnosis, files: Sequence[str] = ()) -> dict[str, A
         "views": [_view(view) for view in diagnosis.views],
     }
     return {key: finite(value) for key, value in report.items()}
-
-
-def report_text(report: Mapping[str, Any]) -> str:
-    """Format a report as JSON. Each entry of a list of objects and each curve is on a line of its own."""
-    parts = []
-    for key, value in report.items():
-        listed = isinstance(value, list) and any(isinstance(entry, dict) for entry in value)
-        text = "[\n  " + ",\n  ".join(_entry(entry) for entry in value) + "]" if listed else _in_line(value)
-        parts.append(f" {json.dumps(key)}: {text}")
-    return "{\n" + ",\n".join(parts) + "\n}\n"
-
-
-def _entry(entry: Mapping[str, Any]) -> str:
-    if "evidence" not in entry:
-        return _in_line(entry)
-    return "{" + ",\n   ".join(f"{json.dumps(key)}: {_in_line(value)}" for key, value in entry.items()) + "}"
-
-
-def _in_line(value: Any) -> str:
-    return json.dumps(value, ensure_ascii=False, allow_nan=False)
 
 
 def _plain(value: Any, **renamed: str) -> Any:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from tendonfmu.diagnosis import (
     Cause,
@@ -25,13 +24,13 @@ from tendonfmu.report.diagnosis_text import (
     confusion_sentence,
     error_rows,
     error_sentence,
+    gain_text,
     has_rivals,
     headline,
     hidden,
     hidden_sentences,
     left_of,
     left_sentence,
-    meaning_of_gain,
     names_of,
     next_sentence,
     place_rows,
@@ -53,7 +52,7 @@ from tendonfmu.report.numbers import (
     rounded,
     together,
 )
-from tendonfmu.report.page import Tile, drawn, render
+from tendonfmu.report.page import Tile, render
 
 PAGE = "diagnosis.html"
 _MOST = 4  # pairs listed at most
@@ -66,14 +65,14 @@ def diagnosis_page(diagnosis: Diagnosis) -> str:
     names, (factor, unit) = names_of(diagnosis), unit_of(diagnosis)
     return render(
         "diagnosis.html.jinja",
-        drawn(diagnosis_sheets(diagnosis)),
+        diagnosis_sheets(diagnosis),
         diagnosis=diagnosis,
         words=words_of(diagnosis.kind),
         unit=unit,
         first=_first_screen(diagnosis, names),
         finger=finger_figure(diagnosis),
         fall=waterfall_of(diagnosis, names),
-        cards=cards_of(diagnosis, names),
+        cards=[_card(diagnosis, cause, names) for cause in reported_causes(diagnosis)],
         too_small=_too_small(diagnosis, names),
         uncertain=[
             (capital(cause.title), names.places(cause), percent_interval(cause.gain), capital(cause.experiment))
@@ -157,11 +156,6 @@ def _experiment(diagnosis: Diagnosis, names: Names) -> Iterator[str]:
 # --- tables -----------------------------------------------------------------------------------------------------------
 
 
-def cards_of(diagnosis: Diagnosis, names: Names) -> list[dict[str, Any]]:
-    """Return what a page shows of each cause."""
-    return [_card(diagnosis, cause, names) for cause in reported_causes(diagnosis)]
-
-
 def _card(diagnosis: Diagnosis, cause: Cause, names: Names) -> dict[str, Any]:
     """Return what a page shows of one cause."""
     certainty = f"p = {probability(cause.p_value)}".replace("= <", "<")
@@ -174,7 +168,7 @@ def _card(diagnosis: Diagnosis, cause: Cause, names: Names) -> dict[str, Any]:
         "place": capital(names.places(cause)),
         "size": cause.size,
         "long": len(cause.size) > _LONG,
-        "gain": f"{percent_interval(cause.gain)} {meaning_of_gain(diagnosis, cause)}",
+        "gain": gain_text(diagnosis, cause),
         "certainty": certainty,
         "explanation": cause.explanation,
         "confusion": confusion_sentence(cause, names),
@@ -266,8 +260,7 @@ def _method(diagnosis: Diagnosis) -> Iterator[str]:
 # --- how much error each cause takes away -----------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Part:
+class Part(NamedTuple):
     """Part of a bar."""
 
     tone: str  # "nominal", "cause", "more", "noise" or "predictable"
@@ -275,8 +268,7 @@ class Part:
     width: float
 
 
-@dataclass(frozen=True)
-class Step:
+class Step(NamedTuple):
     """Row of a waterfall."""
 
     label: str  # what the row shows, in plain words, with its place
@@ -284,12 +276,11 @@ class Step:
     parts: tuple[Part, ...]  # parts of the bar
 
 
-@dataclass(frozen=True)
-class Waterfall:
+class Waterfall(NamedTuple):
     """What each cause takes away from the error."""
 
     unit: str  # unit of the values
-    rows: tuple[Step, ...]  # from the error of the nominal model to what is left
+    rows: list[Step]  # from the error of the nominal model to what is left
     floor: float | None  # position of the noise floor, per cent of the widest bar; None if unknown
     predictable: str  # legend of the parts with the tone "predictable"
     taken: str  # legend of the parts with the tone "cause"
@@ -297,43 +288,29 @@ class Waterfall:
 
 def waterfall_of(diagnosis: Diagnosis, names: Names) -> Waterfall:
     """Return the waterfall of a diagnosis."""
-    factor, unit = unit_of(diagnosis)
+    (factor, unit), words, left = unit_of(diagnosis), words_of(diagnosis.kind), left_of(diagnosis)
     steps = [factor * step for step in diagnosis.steps]
     widest = max([step for step in steps if math.isfinite(step)], default=0.0) or 1.0
-    noise = _noise(diagnosis, steps[-1])
-    floor = None if noise is None else 100.0 * noise / widest
-    words = words_of(diagnosis.kind)
-    return Waterfall(unit, tuple(_steps(diagnosis, names, steps, widest)), floor, words.left, words.taken)
-
-
-def _steps(diagnosis: Diagnosis, names: Names, steps: list[float], widest: float) -> Iterator[Step]:
     digits = decimals(widest)
     shown = [round(step, digits) for step in steps]
 
-    def part(tone: str, begin: float, end: float) -> Part:
-        low, high = sorted((100.0 * begin / widest, 100.0 * end / widest))
+    def part(tone: str, *ends: float) -> Part:
+        low, high = sorted(100.0 * end / widest for end in ends)
         return Part(tone, round(low, 2), round(high - low, 2))
 
+    rows = []
     if diagnosis.torque_causes:
-        label = f"error of the {words_of(diagnosis.kind).nominal}"
-        yield Step(label, f"{shown[0]:.{digits}f}", (part("nominal", 0.0, steps[0]),))
+        rows.append(Step(f"error of the {words.nominal}", f"{shown[0]:.{digits}f}", (part("nominal", 0.0, steps[0]),)))
     numbers = [k for k, cause in enumerate(diagnosis.causes, start=1) if cause.gain_unit == "N.m"]
     for k, (number, cause) in enumerate(zip(numbers, diagnosis.torque_causes, strict=True)):
         change = shown[k + 1] - shown[k]
         tone, sign = ("cause", "−") if change <= 0 else ("more", "+")
         label = f"{number}. {at_place(cause.title, cause.where, names)}"
-        yield Step(label, f"{sign}{abs(change):.{digits}f}", (part(tone, steps[k], steps[k + 1]),))
-    noise = _noise(diagnosis, steps[-1])
-    parts: tuple[Part, ...] = (part("nominal", 0.0, steps[-1]),)
-    if noise is not None:
-        parts = (part("noise", 0.0, noise), part("predictable", noise, steps[-1]))
+        rows.append(Step(label, f"{sign}{abs(change):.{digits}f}", (part(tone, steps[k], steps[k + 1]),)))
     label = "what remains" if diagnosis.torque_causes else "error of the model"
-    yield Step(label, f"{shown[-1]:.{digits}f}", parts)
-
-
-def _noise(diagnosis: Diagnosis, last: float) -> float | None:
-    """Return the noise part of the last step; all of it where the remainder would round to 0."""
-    left = left_of(diagnosis)
-    if left is None:
-        return None
-    return min(left.noise, last) if left.predictable > 0.0 else last
+    rest, floor = [part("nominal", 0.0, steps[-1])], None
+    if left is not None:  # all of it is noise where the rest would round to 0
+        noise = min(left.noise, steps[-1]) if left.predictable > 0.0 else steps[-1]
+        rest, floor = [part("noise", 0.0, noise), part("predictable", noise, steps[-1])], 100.0 * noise / widest
+    rows.append(Step(label, f"{shown[-1]:.{digits}f}", tuple(rest)))
+    return Waterfall(unit, rows, floor, words.left, words.taken)

@@ -295,6 +295,11 @@ def meaning_of_gain(diagnosis: Diagnosis, cause: Cause) -> str:
     return words.own_gain + (f", with the other {words.one}s in the model" if len(diagnosis.torque_causes) > 1 else "")
 
 
+def gain_text(diagnosis: Diagnosis, cause: Cause) -> str:
+    """Write the gain of a cause with its interval, and what it is less of."""
+    return f"{percent_interval(cause.gain)} {meaning_of_gain(diagnosis, cause)}"
+
+
 def own_gain_sentences(diagnosis: Diagnosis) -> Iterator[str]:
     """Explain the column "gain" of `tables`: one sentence for all causes whose gain has the same meaning."""
     meanings: dict[str, list[str]] = {}

@@ -14,7 +14,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.arrays import Flags, Numbers
-from tendonfmu.drawing import Band, Curve, Dots, Interval, Panel, Sheet
+from tendonfmu.drawing import (
+    BLUE,
+    DARK,
+    GREY,
+    ORANGE,
+    SKY,
+    Interval,
+    Panel,
+    Sheet,
+    Trace,
+    band,
+    curve,
+    dots,
+    mark,
+    panel,
+    stripes,
+)
 from tendonfmu.estimate import FitPicture, FitSeries, identifiability
 from tendonfmu.recordings import flagged_stretches
 from tendonfmu.report.fit_laws import law_sheets
@@ -34,16 +50,10 @@ _KINDS = {
 }
 _ORDER = ("static", "coulomb", "stribeck_velocity", "viscous")
 _FEWEST = 8  # samples in a bin; emptier bins are left out
-_TORQUE_KEYS = (
-    ("measured", "measured joint torque"),
-    ("predicted", "model with bias, before the bias learns from the sample"),
-    ("bias", "bias alone"),
-)
 _RESIDUAL_CAPTION = (
     "Residual before the bias learns from the sample: measured minus modelled torque. A median away from 0 over the "
     "angle or the velocity is friction that the model lacks; a wide band is noise or stick-slip."
 )
-_RESIDUAL_KEYS = (("median", "median"), ("spread", "10 to 90 % of the samples"), ("held_out", "held out of training"))
 
 
 def fit_sheets(picture: FitPicture) -> list[Sheet]:
@@ -81,12 +91,11 @@ def torque_sheets(picture: FitPicture) -> Iterator[Sheet]:
         scale = unit_of([series])
         panels = [_torque_panel(series, shown, j, joint, scale, name) for j, joint in enumerate(joints)]
         yield Sheet(
-            section="torque",
-            name=name,
-            title=f"{part}: {series.label}, {begin:.0f} to {end:.0f} s",
-            caption=f"Mean tendon force {series.mean_force:.3g} N." + (explanation if number == 1 else ""),
-            keys=_TORQUE_KEYS,
-            panels=tuple(panels),
+            "torque",
+            name,
+            f"{part}: {series.label}, {begin:.0f} to {end:.0f} s",
+            panels,
+            f"Mean tendon force {series.mean_force:.3g} N." + (explanation if number == 1 else ""),
         )
 
 
@@ -125,19 +134,22 @@ def _torque_panel(series: FitSeries, shown: Flags, j: int, name: str, scale: tup
     left, size = rms(residual), rms(torque)
     share = f"{100 * left / size:.0f} %" if size > 0 and np.isfinite(left) else "unknown"
     gaps = _gaps(series.time, time)
-    return Panel(
-        title=name,
-        note=f"residual {share} of torque",
-        alt=f"Joint {name}, {time[0]:.0f} to {time[-1]:.0f} s of {series.label}: measured torque, the model's "
+
+    def drawn(values: Numbers, *style: Any, **more: Any) -> Trace:
+        return curve(np.insert(time, gaps, np.nan), factor * np.insert(values, gaps, np.nan), *style, **more)
+
+    return panel(
+        name,
+        f"Joint {name}, {time[0]:.0f} to {time[-1]:.0f} s of {series.label}: measured torque, the model's "
         f"prediction and the bias in it. Torque rms {factor * size:.3g} {unit}, residual rms {factor * left:.3g} "
         f"{unit}.",
-        x_label="time (s)",
-        y_label=f"torque ({unit})",
+        "time (s)",
+        f"torque ({unit})",
+        drawn(torque, "measured joint torque", DARK, 1.0),
+        drawn(bias, "bias alone", ORANGE, 0.8, alpha=0.8),
+        drawn(predicted, "model with bias, before the bias learns from the sample", SKY, 1.5),
+        note=f"residual {share} of torque",
         size="medium",
-        curves=tuple(
-            Curve(style, np.insert(time, gaps, np.nan), factor * np.insert(values, gaps, np.nan))
-            for style, values in (("measured", torque), ("bias", bias), ("predicted", predicted))
-        ),
         x_limits=(float(time[0]), float(time[-1])),
         zoom=zoom,
     )
@@ -170,15 +182,7 @@ def _residual_sheet(picture: FitPicture, series: Sequence[FitSeries], title: str
         for j, name in enumerate(picture.fitted.joint_names)
         for panel in _residual_panels(series, j, name, scale, zoom)
     ]
-    held_out = any(one.held_out is not None for one in series)
-    return Sheet(
-        section="residual",
-        name=zoom,
-        title=title,
-        caption=_RESIDUAL_CAPTION if number == 1 else "",
-        keys=_RESIDUAL_KEYS if held_out else _RESIDUAL_KEYS[:2],
-        panels=tuple(panels),
-    )
+    return Sheet("residual", zoom, title, panels, _RESIDUAL_CAPTION if number == 1 else "")
 
 
 def _residual_panels(
@@ -187,7 +191,7 @@ def _residual_panels(
     factor, unit = scale
     residual = factor * np.concatenate([one.residual[:, j] for one in series])
     judged = np.isfinite(residual) & np.concatenate([_judged(one) for one in series])  # NaN: no kinematics there
-    time, stripes = _end_to_end(series)
+    time, held = _end_to_end(series)
     angle, speed = (
         np.concatenate([getattr(one, key)[:, j] for one in series]) for key in ("joint_angle", "joint_speed")
     )
@@ -200,16 +204,16 @@ def _residual_panels(
     ):
         centre, low, middle, high = _binned(x[judged], residual[judged], even)
         worst = float(np.max(np.abs(middle))) if middle.size else float("nan")
-        yield Panel(
-            title=f"{name} over {what}",
-            alt=f"Residual of joint {name} over {what}: its median in a bin is at most {worst:.2g} {unit} away from 0, "
+        yield panel(
+            f"{name} over {what}",
+            f"Residual of joint {name} over {what}: its median in a bin is at most {worst:.2g} {unit} away from 0, "
             f"its rms is {rms(residual[judged]):.3g} {unit}.",
+            x_label,
+            f"residual ({unit})",
+            band(centre, low, high, "10 to 90 % of the samples", SKY, 0.35),
+            curve(centre, middle, "median", BLUE, 1.6),
+            stripes(held if even else [], "held out of training", ORANGE, 0.16),
             note=f"rms {rms(residual[judged]):.3g} {unit}" if even else "",
-            x_label=x_label,
-            y_label=f"residual ({unit})",
-            bands=(Band("spread", centre, low, high),),
-            curves=(Curve("median", centre, middle),),
-            stripes={"held_out": stripes} if even else {},
             y_limits=(-limit, limit) if limit > 0 else None,
             zoom=zoom if even else "",
         )
@@ -224,14 +228,14 @@ def _judged(series: FitSeries) -> Flags:
 
 def _end_to_end(series: Sequence[FitSeries]) -> tuple[Numbers, list[Interval]]:
     """Return the times of recordings joined end to end, from 0, and the intervals that were held out."""
-    times, stripes, begin = [], [], 0.0
+    times, held, begin = [], list[Interval](), 0.0
     for one in series:
         time = one.time - one.time[0] + begin
         times.append(time)
         if one.held_out is not None:
-            stripes += flagged_stretches(time, one.held_out)
+            held += flagged_stretches(time, one.held_out)
         begin = float(time[-1])
-    return np.concatenate(times), stripes
+    return np.concatenate(times), held
 
 
 def _binned(x: Numbers, y: Numbers, even: bool) -> tuple[Numbers, Numbers, Numbers, Numbers]:
@@ -293,43 +297,42 @@ def error_sheet(picture: FitPicture) -> Sheet:
         for (_, _, name), of_kind in zip(kinds, members, strict=True)
     )
     known, of = sum(bool(entry["identified"]) for entry in entries), len(entries)
-    panel = Panel(
-        title="Standard error over value",
-        alt=f"Standard error over value of {of} numbers by kind, on a logarithmic axis; {known} are identified: "
+    shown = panel(
+        "Standard error over value",
+        f"Standard error over value of {of} numbers by kind, on a logarithmic axis; {known} are identified: "
         + "; ".join(names)
         + ".",
-        x_label="standard error / value",
-        y_label="",
+        "standard error / value",
+        "",
+        *_dots(members),
+        mark(identifiability.LIMIT),
         size="large",
-        dots=tuple(_dots(members)),
         log_x=True,
         x_limits=_SHOWN,
-        ticks=_TICKS,
+        x_ticks=_TICKS,
         rows=names,
-        line=identifiability.LIMIT,
         height=90 + 24 * len(names),
     )
     return Sheet(
-        section="errors",
-        name="standard_errors",
-        title="How well each number is known",
-        caption="Each kind shows how many of its numbers are identified. The line is at "
+        "errors",
+        "standard_errors",
+        "How well each number is known",
+        [shown],
+        "Each kind shows how many of its numbers are identified. The line is at "
         f"{100 * identifiability.LIMIT:.0f} % of the value. Dots beyond the axis are drawn at its end.",
-        keys=(("identified", "identified"), ("unidentified", "not identified")),
-        panels=(panel,),
     )
 
 
-def _dots(members: list[list[Mapping[str, Any]]]) -> Iterator[Dots]:
+def _dots(members: list[list[Mapping[str, Any]]]) -> Iterator[Trace]:
     """Place the dots of a row side by side in the order of the description, so that none hides another."""
-    for style, wanted in (("identified", True), ("unidentified", False)):
-        x, y = [], []
+    for name, wanted in (("identified", True), ("not identified", False)):
+        x, y = list[float](), list[float]()
         for row, entries in enumerate(members):
             for k, entry in enumerate(entries):
                 if bool(entry["identified"]) == wanted:
                     x.append(float(np.clip(relative_error(entry), *_SHOWN)))
                     y.append(row + (0.6 * (k + 0.5) / len(entries) - 0.3))
-        yield Dots(style, np.array(x), np.array(y))
+        yield dots(x, y, name, *((BLUE, 0.7) if wanted else (GREY, 1.0)), ring=not wanted)
 
 
 # --- correlation ------------------------------------------------------------------------------------------------------

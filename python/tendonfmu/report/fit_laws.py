@@ -7,7 +7,21 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from tendonfmu.arrays import Numbers
-from tendonfmu.drawing import Band, Curve, Panel, Sheet
+from tendonfmu.drawing import (
+    BLUE,
+    GREY,
+    ORANGE,
+    SILVER,
+    VERMILION,
+    Panel,
+    Sheet,
+    Trace,
+    band,
+    curve,
+    histogram,
+    panel,
+    stripes,
+)
 from tendonfmu.estimate import FitPicture, LawBands, LawCurve, asymmetric, numbers_of
 from tendonfmu.files import are, counted
 from tendonfmu.model import Effect, effects, sliding_velocity, velocity_threshold
@@ -16,11 +30,7 @@ LAWS_DRAWN = 240  # friction effects at most; a snake of 16 joints and 64 tendon
 _LOOKED_AT = 20_000  # samples at most that say where the motion was
 _POINTS = 160  # of a curve
 _HEADROOM = 2.5  # the axis ends at this times the highest curve, even if a band is wider
-_LAW_KEYS = (
-    ("confidence", "95 % confidence"),
-    ("start", "start"),
-    ("data", "range of the training samples"),
-)
+_VISITED = "range of the training samples"
 
 
 def law_sheets(picture: FitPicture) -> Iterator[Sheet]:
@@ -34,12 +44,11 @@ def law_sheets(picture: FitPicture) -> Iterator[Sheet]:
         here = [(start, fitted) for start, fitted in drawn if fitted.tendon == tendon]
         name = picture.fitted.tendon_names[tendon - 1] if tendon else ""
         yield Sheet(
-            section="laws",
-            name=f"laws_tendon_{tendon}" if tendon else "laws_joints",
-            title=f"Tendon {tendon}: {name}" if tendon else "In the joints",
-            caption=_caption([fitted for _, fitted in here]) + hidden,
-            keys=_keys(picture, [fitted for _, fitted in here]),
-            panels=tuple(desk.panel(start, fitted) for start, fitted in here),
+            "laws",
+            f"laws_tendon_{tendon}" if tendon else "laws_joints",
+            f"Tendon {tendon}: {name}" if tendon else "In the joints",
+            [desk.panel(start, fitted) for start, fitted in here],
+            _caption([fitted for _, fitted in here]) + hidden,
             folded=tendon > 1,
         )
 
@@ -58,20 +67,6 @@ def _caption(drawn: Sequence[Effect]) -> str:
 def _is_plain(effect: Effect) -> bool:
     """Say whether a law has working points and one side for both directions."""
     return bool(effect.angles) and not asymmetric(effect)
-
-
-def _keys(picture: FitPicture, drawn: Sequence[Effect]) -> tuple[tuple[str, str], ...]:
-    points = [effect for effect in drawn if effect.angles]
-    first = [("fitted", "fitted, over the angle at the median speed" if points else "fitted")]
-    if any(map(_is_plain, points)):
-        first += [("slow", "at v_min"), ("slow_limit", "its 95 %")]
-    if any(asymmetric(effect) for effect in points):
-        first += [("negative", "negative direction")]
-    if not all(is_known(effect, picture) for effect in drawn):
-        first += [("unknown", "not identified")]
-    still = any(not effect.angles and velocity_threshold(picture.fitted.data, effect) for effect in drawn)
-    rest = [("standstill", "below v_min: no friction is modelled, the bias replaces it")] if still else []
-    return (*first, *_LAW_KEYS, *rest)
 
 
 def is_known(effect: Effect, picture: FitPicture) -> bool:
@@ -116,9 +111,11 @@ class _Desk:
             return joint if effect.kind == "friction" else f"{joint}, load"
         return f"{'pulley' if effect.kind == 'pulley_friction' else 'edge'} {effect.joint} ({joint})"
 
-    def _style(self, effect: Effect) -> str:
-        """Return how a law is drawn: grey where nothing tells its Coulomb friction."""
-        return "fitted" if is_known(effect, self._picture) else "unknown"
+    def _fitted(self, effect: Effect, x: Numbers, y: Numbers) -> Trace:
+        """Draw a fitted law: grey where nothing tells its Coulomb friction."""
+        if not is_known(effect, self._picture):
+            return curve(x, y, "not identified", GREY, 1.8)
+        return curve(x, y, "fitted, over the angle at the median speed" if effect.angles else "fitted", BLUE, 1.8)
 
     def _note(self, effect: Effect) -> str:
         numbers = numbers_of(effect, self._picture.report)
@@ -146,17 +143,20 @@ class _Desk:
         ends = factor * sides[1].fitted[[0, -1]]
         top = factor * _top(sides)
         limit = unit * fastest
-        return Panel(
-            title=self._title(fitted),
-            note=self._note(fitted),
-            alt=f"{self._title(fitted)}: {y_label} over {x_label}: fitted {ends[0]:.3g} where sliding "
+        still_name = "below v_min: no friction is modelled, the bias replaces it"
+        rest = [(-unit * threshold, unit * threshold)] if threshold else []
+        return panel(
+            self._title(fitted),
+            f"{self._title(fitted)}: {y_label} over {x_label}: fitted {ends[0]:.3g} where sliding "
             f"begins, {ends[1]:.3g} at {limit:.3g}; {self._note(fitted)}.",
-            x_label=x_label,
-            y_label=y_label,
-            bands=(Band("confidence", x, both("high", "low"), both("low", "high")),),
-            curves=(Curve("start", x, both("start", "start")), Curve(self._style(fitted), x, both("fitted", "fitted"))),
-            stripes={"standstill": [(-unit * threshold, unit * threshold)]} if threshold else {},
-            data=_histogram(unit * sliding, -limit, limit),
+            x_label,
+            y_label,
+            histogram(unit * sliding, -limit, limit, _VISITED),
+            band(x, both("high", "low"), both("low", "high"), "95 % confidence"),
+            curve(x, both("start", "start"), "start", GREY, 1.1, "dash"),
+            self._fitted(fitted, x, both("fitted", "fitted")),
+            stripes(rest, still_name, SILVER, 0.35),
+            note=self._note(fitted),
             x_limits=(-limit, limit),
             y_limits=(-top, top),
         )
@@ -173,26 +173,30 @@ class _Desk:
             drawn = [("negative", -1, median), ("fitted", 1, median)]
         laws = [self._bands.over_angle(start, fitted, sign, speed, angle) for _, sign, speed in drawn]
         factor, y_label = _unit(fitted, laws)
-        bands, curves = [], []
-        for (style, _, _), curve in zip(drawn, laws, strict=True):
-            curves.append(Curve("start", angle, factor * curve.start))
+        traces: list[Trace] = histogram(visited, float(angle[0]), float(angle[-1]), _VISITED)
+        for (style, _, _), law in zip(drawn, laws, strict=True):
+            ends = factor * law.low, factor * law.high
             if style == "slow":
-                curves += [Curve("slow_limit", angle, factor * limit) for limit in (curve.low, curve.high)]
+                traces += [curve(angle, end, "its 95 %", ORANGE, 0.9, "dot") for end in ends]
+            elif style == "negative":
+                traces += band(angle, *ends, "", VERMILION, 0.18)
             else:
-                bands.append(Band(f"{style}_confidence", angle, factor * curve.low, factor * curve.high))
-            curves.append(Curve(self._style(fitted) if style == "fitted" else style, angle, factor * curve.fitted))
+                traces += band(angle, *ends, "95 % confidence")
+            traces.append(curve(angle, factor * law.start, "start", GREY, 1.1, "dash"))
+        for (style, _, _), law in zip(drawn, laws, strict=True):
+            y = factor * law.fitted
+            lines = {"slow": ("at v_min", ORANGE), "negative": ("negative direction", VERMILION)}
+            traces.append(self._fitted(fitted, angle, y) if style == "fitted" else curve(angle, y, *lines[style], 1.8))
         before = self._picture.fitted.joint_names[fitted.joint - 2] if fitted.joint > 1 else ""
         lowest, highest = factor * laws[-1].fitted.min(), factor * laws[-1].fitted.max()
-        return Panel(
-            title=self._title(fitted),
-            note=self._note(fitted),
-            alt=f"{self._title(fitted)}: {y_label} over the angle of {before or 'the base'}, {len(fitted.angles)} "
+        return panel(
+            self._title(fitted),
+            f"{self._title(fitted)}: {y_label} over the angle of {before or 'the base'}, {len(fitted.angles)} "
             f"working points: fitted {lowest:.3g} to {highest:.3g}; {self._note(fitted)}.",
-            x_label=f"angle of {before} (rad)" if before else "angle (rad)",
-            y_label=y_label,
-            bands=tuple(bands),
-            curves=tuple(curves),
-            data=_histogram(visited, float(angle[0]), float(angle[-1])),
+            f"angle of {before} (rad)" if before else "angle (rad)",
+            y_label,
+            traces,
+            note=self._note(fitted),
             x_limits=(float(angle[0]), float(angle[-1])),
             y_limits=(0.0, factor * _top(laws)),
         )
@@ -212,11 +216,3 @@ def _unit(effect: Effect, curves: Sequence[LawCurve]) -> tuple[float, str]:
     largest = _top(curves)
     factor, unit = next((pair for pair in ((1.0, "N·m"), (1e3, "mN·m")) if pair[0] * largest >= 0.5), (1e6, "µN·m"))
     return factor, f"friction ({unit})" if effect.kind == "friction" else f"load friction ({unit}/N)"
-
-
-def _histogram(values: Numbers, low: float, high: float) -> tuple[Numbers, Numbers] | None:
-    """Return bin edges and heights, the highest 1."""
-    if not values.size:
-        return None
-    counts, edges = np.histogram(values, 60, (low, high))
-    return edges, counts / max(int(counts.max()), 1)

@@ -11,6 +11,7 @@ from tendonfmu.files import write_text
 from tendonfmu.model import part_of
 from tendonfmu.report.fit_figures import fit_sheets, strongest_pairs
 from tendonfmu.report.fit_text import (
+    RESIDUAL_HEADINGS,
     ResidualTable,
     apart,
     consistency,
@@ -20,8 +21,8 @@ from tendonfmu.report.fit_text import (
     state_of,
     summary_sentences,
 )
-from tendonfmu.report.numbers import Row, percent, rounded, unit_text
-from tendonfmu.report.page import Drawn, Tile, drawn, make_folder, render
+from tendonfmu.report.numbers import Row, percent, unit_text
+from tendonfmu.report.page import Tile, make_folder, render
 
 PAGE = "report.html"
 PAIRS = 20  # most strongly correlated pairs in the table
@@ -32,22 +33,27 @@ Entry = Mapping[str, Any]
 def write_fit_page(picture: FitPicture, folder: Path) -> dict[Path, str]:
     """Write `report.html` to a folder, which is made if missing, whole or not at all."""
     make_folder(folder)
-    write_text(folder / PAGE, fit_page(picture, drawn(fit_sheets(picture))))
+    write_text(folder / PAGE, fit_page(picture))
     return {folder / PAGE: "all results, to be read in a browser"}
 
 
-def fit_page(picture: FitPicture, sheets: Sequence[Drawn] = ()) -> str:
+def fit_page(picture: FitPicture) -> str:
     """Return the HTML text of the page of a fit."""
-    report, tables = picture.report, list(residual_tables(picture))
+    report, joints = picture.report, picture.fitted.joint_names
+    tables = residual_tables(report, joints)
     return render(
         "fit.html.jinja",
-        sheets,
+        fit_sheets(picture),
         report=report,
         state=state_of(report),
         tiles_shown=_tiles(report, tables),
         sentences=list(summary_sentences(picture, tables)),
-        joint_names=picture.fitted.joint_names,
-        residuals=[_residuals(table) for table in page_tables(picture)],
+        joint_names=joints,
+        residuals=[
+            (f"{each.title}: rms in {each.unit}", [(row.name, *row.texts) for row in each.rows])
+            for each in page_tables(tables, joints)
+        ],
+        residual_headings=RESIDUAL_HEADINGS,
         consistency=list(consistency(picture)),
         doubts=list(_doubts(report)),
         pairs=[
@@ -76,21 +82,6 @@ def _tiles(report: Entry, tables: Sequence[ResidualTable]) -> list[Tile]:
 
 
 # --- tables -----------------------------------------------------------------------------------------------------------
-
-
-def _residuals(table: ResidualTable) -> dict[str, Any]:
-    """Return title and rows (name, torque, fitted, left, before the fit, bias alone, friction alone) of a table."""
-    rows = [
-        (
-            row.name,
-            rounded(row.torque),
-            rounded(row.fitted),
-            "" if row.left is None else f"{rounded(100 * row.left, 2)} %",
-            *map(rounded, (row.start, row.bias_only, row.model_only)),
-        )
-        for row in table.rows
-    ]
-    return {"title": f"{table.title}: rms in {table.unit}", "rows": rows}
 
 
 def _doubts(report: Entry) -> Iterator[tuple[str, list[Row]]]:

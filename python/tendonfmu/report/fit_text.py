@@ -26,16 +26,19 @@ _COMPARED = "Not trained on: "
 # --- residuals --------------------------------------------------------------------------------------------------------
 
 
+RESIDUAL_HEADINGS = ("torque", "fitted", "left", "before the fit", "bias alone", "friction alone")
+
+
 @dataclass(frozen=True)
 class ResidualRow:
     """Residuals of one joint, or of all together: rms in `ResidualTable.unit`, None where unknown."""
 
     name: str  # of the joint, or of the set of data
     torque: float | None
+    fitted: float | None
     start: float | None
     bias_only: float | None
     model_only: float | None
-    fitted: float | None
 
     @property
     def left(self) -> float | None:
@@ -44,6 +47,13 @@ class ResidualRow:
 
     def share(self, value: float | None) -> float | None:
         return value / self.torque if value is not None and self.torque else None
+
+    @property
+    def texts(self) -> Row:
+        """Return the cells below `RESIDUAL_HEADINGS`."""
+        left = "–" if self.left is None else f"{rounded(100 * self.left, 2)} %"
+        others = map(rounded, (self.start, self.bias_only, self.model_only))
+        return rounded(self.torque), rounded(self.fitted), left, *others
 
 
 @dataclass(frozen=True)
@@ -56,36 +66,33 @@ class ResidualTable:
     all: ResidualRow  # all joints together
 
 
-def residual_tables(picture: FitPicture) -> Iterator[ResidualTable]:
-    """List the residuals of a fit by set of data."""
-    residual = picture.report["residual"]
+def residual_tables(report: Report, joints: Sequence[str]) -> list[ResidualTable]:
+    """List the residuals of a fit by set of data, all in one unit."""
+    residual = report["residual"]
     sets = [("Training", residual["train"]), ("Held out of training", residual.get("held_out"))]
     sets += [(f"{_COMPARED}{run['label']}", run) for run in residual.get("comparisons") or []]
-    for title, data in sets:
-        if data and data.get("rms"):
-            yield _residual_table(title, data, picture.fitted.joint_names)
+    known = [(title, data) for title, data in sets if data and data.get("rms")]
+    factor, unit = torque_unit(max((max(column(data["torque_rms"])) for _, data in known), default=0.0))
+    keys = ("torque_rms", "rms", "start_rms", "bias_only_rms", "model_only_rms")
+    listed = []
+    for title, data in known:
+        columns = [column(data.get(key) or [None] * len(joints)) for key in keys]
+        rows = [
+            ResidualRow(name, *(factor * value if math.isfinite(value) else None for value in values))
+            for name, *values in zip(
+                [*joints, "all joints"], *([*each, together(each)] for each in columns), strict=True
+            )
+        ]
+        listed.append(ResidualTable(title, unit, rows if len(joints) > 1 else rows[:1], rows[-1]))
+    return listed
 
 
-def _residual_table(title: str, data: Report, joints: Sequence[str]) -> ResidualTable:
-    keys = ("torque_rms", "start_rms", "bias_only_rms", "model_only_rms", "rms")
-    columns = [column(data.get(key) or [None] * len(joints)) for key in keys]
-    factor, unit = torque_unit(max(columns[0], default=0.0))
-    rows = [
-        ResidualRow(name, *(factor * value if math.isfinite(value) else None for value in values))
-        for name, *values in zip([*joints, "all joints"], *([*each, together(each)] for each in columns), strict=True)
-    ]
-    return ResidualTable(title, unit, rows if len(joints) > 1 else rows[:1], rows[-1])
-
-
-def page_tables(picture: FitPicture) -> list[ResidualTable]:
+def page_tables(tables: list[ResidualTable], joints: Sequence[str]) -> list[ResidualTable]:
     """List the residuals as the page shows them: those of a finger with one joint are joined, a row per set of data."""
-    tables = list(residual_tables(picture))
-    if len(picture.fitted.joint_names) > 1:
+    if len(joints) > 1 or not tables:
         return tables
-    by_unit: dict[str, list[ResidualRow]] = {}
-    for table in tables:
-        by_unit.setdefault(table.unit, []).append(replace(table.all, name=table.title))
-    return [ResidualTable(picture.fitted.joint_names[0], unit, rows, rows[0]) for unit, rows in by_unit.items()]
+    rows = [replace(table.all, name=table.title) for table in tables]
+    return [ResidualTable(joints[0], tables[0].unit, rows, rows[0])]
 
 
 # --- sentences of the page --------------------------------------------------------------------------------------------
@@ -246,33 +253,18 @@ def consistency(picture: FitPicture) -> Iterator[str]:
 def tables(fit: FrictionFit) -> Iterator[Table]:
     """List the tables to print: what is left of the torque, and the numbers by kind."""
     report, known = fit.report_, fit.report_["identified"]
-    yield _residuals(report, fit.description_.joint_names)
+    sets = residual_tables(report, fit.description_.joint_names)
+    unit = sets[0].unit if sets else "mN·m"
+    yield (
+        f"{report['finger']}: residual before the bias learns from the sample, rms in {unit}",
+        ("", "joint", *RESIDUAL_HEADINGS),
+        [("" if k else each.title, row.name, *row.texts) for each in sets for k, row in enumerate(each.rows)],
+    )
     yield (
         f"numbers that these recordings identify: {known['count']} of {known['of']}",
         ("kind", "numbers", "identified", "median change", "at a bound"),
         list(_kinds(fit.numbers_)),
     )
-
-
-def _residuals(report: Report, joints: Sequence[str]) -> Table:
-    residual = report["residual"]
-    sets = [("training", residual["train"]), ("held out", residual["held_out"])]
-    sets += [(f"{run['label']}, {run['mean_force']:.3g} N", run) for run in residual["comparisons"]]
-    rows = []
-    for label, data in sets:
-        if not data or "rms" not in data:
-            continue
-        for j, joint in enumerate(joints):
-            names = ("torque_rms", "bias_only_rms", "model_only_rms", "start_rms", "rms")
-            left, torque = data["rms"][j], data["torque_rms"][j]
-            share = f"{100 * left / torque:.0f} %" if left is not None and torque else "-"
-            rows.append((label if j == 0 else "", joint, *(_milli(data[name][j]) for name in names), share))
-    headings = ("", "joint", "torque", "bias only", "model only", "before", "fitted", "left")
-    return f"{report['finger']}: residual before the bias learns from the sample, rms in mN·m", headings, rows
-
-
-def _milli(value: float | None) -> str:
-    return "-" if value is None else f"{1e3 * value:.2f}"
 
 
 def _kinds(numbers: Sequence[Fitted]) -> Iterator[Row]:

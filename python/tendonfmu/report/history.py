@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.diagnosis import NBSP, History, Line, Names, at_place, quantity, share_of
-from tendonfmu.drawing import Bars, Curve, Dots, Panel, Sheet
+from tendonfmu.drawing import BLUE, GREY, VERMILION, Panel, Sheet, bars, curve, dots, panel
 from tendonfmu.files import counted, whole_file, write_text
 from tendonfmu.report.numbers import Row, capital, percent, unit_text, with_ends
-from tendonfmu.report.page import drawn, render
+from tendonfmu.report.page import render
 
 FORMAT = "tendonfmu-history-1"
 TABLE, PAGE = "history.csv", "history.html"
@@ -52,12 +52,13 @@ def history_report(history: History, written: Iterable[Path] = ()) -> dict[str, 
 
 
 def _page(history: History, names: Names) -> str:
-    sheets = drawn([_sheet(history, names)] if history.lines else [])
+    panels = [_panel(line, history, names) for line in history.lines]
+    title = f"{history.finger}: {headline(history).rstrip('.')}"
     times = [f"{time:.1f}" if history.dated else f"{time:.0f}" for time in history.times]
     files = [Path(name).name for name in history.recordings]
     return render(
         "history.html.jinja",
-        sheets,
+        [Sheet("history", "history", title, panels)] if panels else [],
         history=history,
         headline=headline(history),
         sentences=[f"{capital(trend_sentence(line, history, names))}." for line in history.lines],
@@ -137,21 +138,6 @@ def columns_of(history: History) -> dict[str, list[Any]]:
 # --- the figure -------------------------------------------------------------------------------------------------------
 
 
-def _sheet(history: History, names: Names) -> Sheet:
-    return Sheet(
-        section="history",
-        name="history",
-        title=f"{history.finger}: {headline(history).rstrip('.')}",
-        keys=(
-            ("after_dots", "named by the diagnosis of that recording"),
-            ("before_dots", "not named"),
-            ("start", "in the reference"),
-            ("after", "95 % interval"),
-        ),
-        panels=tuple(_panel(line, history, names) for line in history.lines),
-    )
-
-
 def _panel(line: Line, history: History, names: Names) -> Panel:
     when = dict(zip(history.recordings, history.times, strict=True))
     x = np.array([when[size.recording] for size in line.sizes])
@@ -161,18 +147,15 @@ def _panel(line: Line, history: History, names: Names) -> Panel:
     named = np.array([size.named for size in line.sizes])
     then = factor * line.sizes[0].size.reference.value
     title = at_place(line.where.effect.replace("_", " ").capitalize(), line.where, names)
-    axis = "weeks" if history.dated else "recording"
-    return Panel(
-        title=title,
-        alt=trend_sentence(line, history, names).replace(NBSP, " "),
-        x_label=axis,
-        y_label=f"{line.sizes[0].size.number.replace('_', ' ')} ({unit})",
+    shown = ((named, "named by the diagnosis of that recording", BLUE), (~named, "not named", VERMILION))
+    return panel(
+        title,
+        trend_sentence(line, history, names).replace(NBSP, " "),
+        "weeks" if history.dated else "recording",
+        f"{line.sizes[0].size.number.replace('_', ' ')} ({unit})",
+        bars(x, low, high, "95 % interval", BLUE, 1.0),
+        curve(x, value, "", BLUE, 0.9, alpha=0.45),
+        curve(x[[0, -1]], np.array([then, then]), "in the reference", GREY, 1.1, "dash"),
+        *(dots(x[chosen], value[chosen], name, colour) for chosen, name, colour in shown if chosen.any()),
         size="medium",
-        curves=(Curve("after_line", x, value), Curve("start", x[[0, -1]], np.array([then, then]))),
-        bars=(Bars("after", x, low, high),),
-        dots=tuple(
-            Dots(style, x[chosen], value[chosen])
-            for style, chosen in (("after_dots", named), ("before_dots", ~named))
-            if chosen.any()
-        ),
     )

@@ -10,10 +10,9 @@ from markupsafe import Markup
 
 from tendonfmu.arrays import Data
 from tendonfmu.diagnosis import Cause, Diagnosis, reported_causes
-from tendonfmu.drawing import GREY
 from tendonfmu.estimate import known_numbers
 from tendonfmu.files import are, counted, listed
-from tendonfmu.model import EDGE_RED, Effect, FingerDrawing, Mark, effects, finger_drawing, finger_svg
+from tendonfmu.model import Effect, Mark, effects, finger_drawing, finger_svg, keys_of
 from tendonfmu.report.diagnosis_words import words_of
 from tendonfmu.report.numbers import capital, rounded
 
@@ -71,20 +70,6 @@ def _marks(number: int, cause: Cause) -> Iterator[Mark]:
 def _elsewhere(cause: Cause) -> str:
     count = len(_places(cause))
     return f"at {counted(count, 'place')}, which the list names" if count else "everywhere"
-
-
-def keys_of(drawing: FingerDrawing) -> Iterator[tuple[str, str, str]]:
-    """Yield the marks of a finger: CSS class, colour, meaning."""
-    tendons = drawing.tendons
-    yield "square", GREY, "end of a tendon"
-    if any(len(tendon.pulleys) for tendon in tendons):
-        yield "ring", GREY, "pulley with friction"
-    if any(len(tendon.edges) for tendon in tendons):
-        yield "ring", EDGE_RED, "edge with friction"
-    if any(len(tendon.varying_edges) for tendon in tendons):
-        yield "dot", EDGE_RED, "edge whose friction varies with the angle"
-    if any(tendon.bidirectional for tendon in tendons):
-        yield "dashed", GREY, "cable loop"
 
 
 def friction_figure(data: Data) -> FingerFigure:

@@ -5,15 +5,14 @@ All texts are escaped.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from tendonfmu.drawing import STYLES, Sheet
+from tendonfmu.drawing import Panel, Sheet, dark_colours, figures_json, packed_plotly
 from tendonfmu.errors import InputError
 from tendonfmu.files import html_template, write_text
-
-Drawn = tuple[Sheet, Sequence[Any]]  # a sheet and the Plotly figure of each of its panels
 
 
 class Tile(NamedTuple):
@@ -24,44 +23,23 @@ class Tile(NamedTuple):
     meaning: str
 
 
-class PageSheet(NamedTuple):
-    """A sheet as the templates show it."""
-
-    sheet: Sheet
-    first: int  # index of the figure of its first panel in the page
-    keys: list[tuple[str, Any, str]]  # (name of the style, the style, meaning)
-
-
-def drawn(sheets: Iterable[Sheet]) -> list[Drawn]:
-    """Make the figures of sheets."""
-    from tendonfmu.drawing import figures_of  # a page is checked for before Plotly is needed
-
-    return [(sheet, figures_of(sheet)) for sheet in sheets]
-
-
-def render(template: str, sheets: Iterable[Drawn] = (), **content: Any) -> str:
-    """Return the HTML text of a page."""
-    by_section: dict[str, list[PageSheet]] = {}
-    figures: list[Any] = []
-    for sheet, of_sheet in sheets:
-        keys = [(name, STYLES[name], meaning) for name, meaning in sheet.keys]
-        by_section.setdefault(sheet.section, []).append(PageSheet(sheet, len(figures), keys))
-        figures += zip(sheet.panels, of_sheet, strict=True)
-    return html_template(template).render(figures=by_section, **_embedded(figures), **content)
-
-
-def _embedded(figures: list[Any]) -> dict[str, Any]:
-    if not figures:
-        return {"drawn": ""}
-    from tendonfmu.drawing import dark_colours, figures_json, packed_plotly
-
-    return {"drawn": figures_json(figures), "plotly": packed_plotly(), "dark_colours": dark_colours()}
+def render(template: str, sheets: Iterable[Sheet] = (), **content: Any) -> str:
+    """Return the HTML text of a page. Its template gets the sheets by section."""
+    by_section: dict[str, list[Sheet]] = {}
+    panels: list[Panel] = []
+    for sheet in sheets:
+        by_section.setdefault(sheet.section, []).append(replace(sheet, first=len(panels)))
+        panels += sheet.panels
+    content["drawn"] = figures_json(panels) if panels else ""
+    if panels:
+        content |= {"plotly": packed_plotly(), "dark_colours": dark_colours()}
+    return html_template(template).render(figures=by_section, **content)
 
 
 def write_figures(page: Path, kicker: str, heading: str, sheets: Iterable[Sheet]) -> None:
     """Write a page of figures; its folder is made if missing."""
     make_folder(page.parent)
-    write_text(page, render("figures.html.jinja", drawn(sheets), title=heading, kicker=kicker, heading=heading))
+    write_text(page, render("figures.html.jinja", sheets, title=heading, kicker=kicker, heading=heading))
 
 
 def make_folder(folder: Path) -> None:

@@ -3,19 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.drawing import Band, Curve, Interval, Panel, Sheet, line_of
+from tendonfmu.drawing import (
+    BLUE,
+    DARK,
+    ORANGE,
+    SKY,
+    VERMILION,
+    Interval,
+    Panel,
+    Sheet,
+    band,
+    curve,
+    lane,
+    panel,
+    stripes,
+)
 from tendonfmu.files import check_output, check_output_folder, counted, write_text
 from tendonfmu.model import Finger
 from tendonfmu.recordings import flagged_stretches
 from tendonfmu.report.numbers import Row, rms, torque_unit
-from tendonfmu.report.page import Tile, drawn, render
+from tendonfmu.report.page import Tile, render
 
 Table = Mapping[str, NDArray[Any]]
 
@@ -24,13 +37,6 @@ PAGE = "run.html"
 ZOOM = "time"  # all panels are zoomed together
 _TIME = "time (s)"
 _MOST = 1000  # stretches of a band; curves are thinned where they are drawn
-_KEYS = (
-    ("measured", "joint torque"),
-    ("predicted", "friction torque"),
-    ("after", "compensated torque"),
-    ("confidence", "± one standard deviation"),
-    ("in_contact", "contact"),
-)
 
 
 def page_of(report: Path) -> Path:
@@ -63,7 +69,7 @@ def run_page(numbers: Mapping[str, Any], table: Table, label: NDArray[Any] | Non
     tendons = [tendon["name"] for tendon in numbers["tendons"]]
     return render(
         "run.html.jinja",
-        drawn(run_sheets(table, joints, tendons, label)),
+        run_sheets(table, joints, tendons, label),
         run=numbers,
         headline_numbers=list(_tiles(numbers)),
         joints=[_joint_row(joint) for joint in numbers["joints"]],
@@ -126,27 +132,21 @@ def run_sheets(
     torques = (table[f"joint_torque[{j}]"] for j in range(1, len(joints) + 1))
     factor, unit = torque_unit(max(float(np.abs(torque).max()) for torque in torques), 1.0)
     for j, name in enumerate(joints, start=1):
-        yield Sheet(
-            section="joints",
-            name=f"joint_{j}",
-            title=name,
-            keys=list(_keys_of(table, j)),
-            panels=list(_torque_panels(table, j, name, factor, unit)),
-        )
+        yield Sheet("joints", f"joint_{j}", name, list(_torque_panels(table, j, name, factor, unit)))
     yield _events_sheet(table, joints, tendons, label)
-    yield Sheet(
-        section="motion",
-        name="motion",
-        title="Joint angles and speeds",
-        keys=(("fitted", "angle"), ("slow", "speed")),
-        panels=list(_motion_panels(table, joints)),
-        folded=True,
-    )
-
-
-def _keys_of(table: Table, j: int) -> Iterator[tuple[str, str]]:
-    drawn = {"in_contact": table[f"joint_contact[{j}]"], "confidence": table[f"compensated_torque_std[{j}]"]}
-    yield from (key for key in _KEYS if np.any(drawn.get(key[0], True)))
+    motion = [
+        panel(
+            f"{name}: {key}",
+            f"Joint {key} of {name} over time",
+            _TIME,
+            f"{key} ({unit})",
+            curve(table["time"], table[f"joint_{key}[{j}]"], key, colour, 1.8),
+            zoom=ZOOM,
+        )
+        for key, colour, unit in (("angle", BLUE, "rad"), ("speed", ORANGE, "rad/s"))
+        for j, name in enumerate(joints, start=1)
+    ]
+    yield Sheet("motion", "motion", "Joint angles and speeds", motion, folded=True)
 
 
 def _torque_panels(table: Table, j: int, name: str, factor: float, unit: str) -> Iterator[Panel]:
@@ -155,25 +155,30 @@ def _torque_panels(table: Table, j: int, name: str, factor: float, unit: str) ->
         factor * np.asarray(table[f"{key}[{j}]"], dtype=np.float64)
         for key in ("joint_torque", "friction_torque", "compensated_torque", "compensated_torque_std")
     )
-    both = Panel(
-        title="Torque and friction",
+    contact = stripes(flagged_stretches(time, table[f"joint_contact[{j}]"]), "contact", VERMILION, 0.16)
+    yield panel(
+        "Torque and friction",
+        f"Joint torque of {name} and its friction torque over time",
+        _TIME,
+        f"torque ({unit})",
+        curve(time, torque, "joint torque", DARK, 1.0),
+        curve(time, friction, "friction torque", SKY, 1.5),
+        contact,
         note=f"{rms(torque):.3g} {unit} rms",
-        alt=f"Joint torque of {name} and its friction torque over time",
-        x_label=_TIME,
-        y_label=f"torque ({unit})",
         size="medium",
-        curves=(Curve("measured", time, torque), Curve("predicted", time, friction)),
-        stripes={"in_contact": flagged_stretches(time, table[f"joint_contact[{j}]"])},
         zoom=ZOOM,
     )
-    yield both
-    yield replace(
-        both,
-        title="Compensated torque",
+    yield panel(
+        "Compensated torque",
+        f"Compensated torque of {name} over time, and when contact was detected there",
+        _TIME,
+        f"torque ({unit})",
+        band(*_thinned_band(time, left - std, left + std), "± one standard deviation") if std.any() else [],
+        curve(time, left, "compensated torque", BLUE, 1.0),
+        contact,
         note=f"{rms(left):.3g} {unit} rms",
-        alt=f"Compensated torque of {name} over time, and when contact was detected there",
-        bands=(Band("confidence", *_thinned_band(time, left - std, left + std)),) if std.any() else (),
-        curves=(Curve("after", time, left),),
+        size="medium",
+        zoom=ZOOM,
     )
 
 
@@ -190,54 +195,28 @@ def _thinned_band(
 
 def _events_sheet(table: Table, joints: Sequence[str], tendons: Sequence[str], label: NDArray[Any] | None) -> Sheet:
     time = table["time"]
-    rows: list[tuple[str, str, list[Interval]]] = []
+    rows: list[tuple[str, str, str, list[Interval]]] = []  # name, meaning, colour, stretches
     if label is not None:
-        rows.append(("labelled contact", "labelled", flagged_stretches(time, label)))
-    rows += [
-        (f"contact, {name}", "contact", flagged_stretches(time, table[f"joint_contact[{j}]"]))
-        for j, name in enumerate(joints, start=1)
-    ]
-    slack = [
-        (f"slack, {name}", "slack", flagged_stretches(time, table[f"slack[{i}]"])) for i, name in enumerate(tendons, 1)
-    ]
-    rows += [row for row in slack if row[2]]  # only tendons that have been slack
-    used = {style for _, style, stretches in rows if stretches}
-    meanings = (("labelled", "contact as labelled"), ("contact", "contact as detected"), ("slack", "tendon slack"))
-    panel = Panel(
-        title="Over time",
-        alt="When contact was detected at each joint, and when a tendon was slack",
-        x_label=_TIME,
-        y_label="",
+        rows.append(("labelled contact", "contact as labelled", DARK, flagged_stretches(time, label)))
+    for j, name in enumerate(joints, start=1):
+        found = flagged_stretches(time, table[f"joint_contact[{j}]"])
+        rows.append((f"contact, {name}", "contact as detected", VERMILION, found))
+    for i, name in enumerate(tendons, start=1):
+        if slack := flagged_stretches(time, table[f"slack[{i}]"]):
+            rows.append((f"slack, {name}", "tendon slack", ORANGE, slack))
+    shown = panel(
+        "Over time",
+        "When contact was detected at each joint, and when a tendon was slack",
+        _TIME,
+        "",
+        *(lane(row[3], k, row[1], row[2], 7.0) for k, row in enumerate(rows) if row[3]),
         size="large" if len(rows) > 8 else "medium",
-        curves=tuple(
-            Curve(style, *line_of(stretches, row)) for row, (_, style, stretches) in enumerate(rows) if stretches
-        ),
-        rows=tuple(name for name, _, _ in rows),
+        rows=[row[0] for row in rows],
         x_limits=(float(time[0]), float(time[-1])) if time[-1] > time[0] else None,
         zoom=ZOOM,
     )
-    return Sheet(
-        section="events",
-        name="events",
-        title="Contact and slack",
-        caption="" if used else "No contact was detected, and no tendon was slack.",
-        keys=tuple(key for key in meanings if key[0] in used),
-        panels=(panel,) if used else (),
-    )
-
-
-def _motion_panels(table: Table, joints: Sequence[str]) -> Iterator[Panel]:
-    time = table["time"]
-    for key, style, unit in (("angle", "fitted", "rad"), ("speed", "slow", "rad/s")):
-        for j, name in enumerate(joints, start=1):
-            yield Panel(
-                title=f"{name}: {key}",
-                alt=f"Joint {key} of {name} over time",
-                x_label=_TIME,
-                y_label=f"{key} ({unit})",
-                curves=(Curve(style, time, np.asarray(table[f"joint_{key}[{j}]"], dtype=np.float64)),),
-                zoom=ZOOM,
-            )
+    none = "" if shown.traces else "No contact was detected, and no tendon was slack."
+    return Sheet("events", "events", "Contact and slack", [shown] if shown.traces else [], none)
 
 
 # --- the numbers ------------------------------------------------------------------------------------------------------

@@ -14,7 +14,27 @@ from numpy.typing import NDArray
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.detect import GRACE, DetectionScore, Event, RocPoint, Scored, Track
-from tendonfmu.drawing import BLUE, SKY, Band, Bars, Curve, Dots, Heat, Panel, Sheet, line_of
+from tendonfmu.drawing import (
+    BLUE,
+    COLOURS,
+    DARK,
+    GREY,
+    SAND,
+    SKY,
+    VERMILION,
+    Panel,
+    Sheet,
+    Trace,
+    band,
+    bars,
+    curve,
+    dots,
+    heat,
+    lane,
+    mark,
+    panel,
+    stripes,
+)
 from tendonfmu.files import counted
 from tendonfmu.recordings import flagged_stretches
 from tendonfmu.report.numbers import with_ends
@@ -28,6 +48,7 @@ BEFORE, AFTER, LONGEST = 0.3, 0.3, 2.5  # s; an event's row before the onset, af
 TAIL = 2.0  # times the delay of 90 %; later events are counted, not drawn
 NAMED = (0.25, 0.5, 1.0, 2.0, 4.0)  # factors written beside their points
 _COLUMNS, _POINTS = 560, 5000
+_INTERVAL = "#B4BBC4"
 _HEAT = ("#FFFFFF", "#BBD9EE", SKY, BLUE, "#08306B")
 
 
@@ -63,68 +84,61 @@ def contact_sheet(scored: Scored) -> Sheet:
     rows = rows[:: max(1, len(rows) // _POINTS)]
     names, joints = scored.subject.finger.joint_names, _strongest(track)
     labelled = flagged_stretches(time, track.label & shown)
+    limits = float(time[rows[0]]), float(time[rows[-1]])
 
-    def panel(title: str, unit: str, curves: Sequence[Curve]) -> Panel:
-        return Panel(
-            title=title,
-            alt=f"{title} over time",
-            x_label="time (s)",
-            y_label=unit,
-            size="wide",
-            curves=tuple(curves),
-            stripes={"label_stripe": labelled},
-            x_limits=(float(time[rows[0]]), float(time[rows[-1]])),
-            zoom="time",
-        )
+    def over_time(title: str, unit: str, *curves: Trace) -> Panel:
+        alt, label = f"{title} over time", stripes(labelled, "", SAND, 0.3)
+        return panel(title, alt, "time (s)", unit, *curves, label, size="wide", x_limits=limits, zoom="time")
 
-    def by_joint(style: str, torque: Numbers) -> list[Curve]:
-        return [Curve(f"{style}_{k}", time[rows], 1e3 * torque[rows, j]) for k, j in enumerate(joints, start=1)]
+    def by_joint(torque: Numbers) -> list[Trace]:
+        return [curve(time[rows], 1e3 * torque[rows, j], names[j], COLOURS[k], 1.1) for k, j in enumerate(joints)]
 
-    sensor = [] if track.external is None else by_joint("sensor", track.external)
+    sensor: list[Trace] = []
+    if track.external is not None:
+        sensor = [
+            curve(time[rows], 1e3 * track.external[rows, j], "reference sensor", COLOURS[k], 1.6, "dash", 0.7)
+            | {"key": ("dashed", DARK, 1.0)}
+            for k, j in enumerate(joints)
+        ]
+    compensated = by_joint(track.outputs["compensated_torque"])
     panels = [
-        panel("Joint torque", "torque (mN·m)", by_joint("joint", track.outputs["joint_torque"])),
-        panel(
-            "Compensated: estimate of the external torque",
-            "torque (mN·m)",
-            [*sensor, *by_joint("joint", track.outputs["compensated_torque"])],
-        ),
+        over_time("Joint torque", "torque (mN·m)", *by_joint(track.outputs["joint_torque"])),
+        over_time("Compensated: estimate of the external torque", "torque (mN·m)", *sensor, *compensated),
     ]
     if track.force is not None:
-        panels.append(panel("Sensed force", "force (N)", [Curve("measured", time[rows], np.abs(track.force[rows]))]))
-    bars = _detection(track, scored.scores[most], shown, labelled)
+        force = curve(time[rows], np.abs(track.force[rows]), "", DARK, 1.0)
+        panels.append(over_time("Sensed force", "force (N)", force))
     panels.append(
-        Panel(
-            title="Detection",
-            alt="When contact is labelled, and when it is detected",
-            x_label="time (s)",
-            y_label="",
+        panel(
+            "Detection",
+            "When contact is labelled, and when it is detected",
+            "time (s)",
+            "",
+            *_detection(track, scored.scores[most], shown, labelled),
             size="wide",
             height=150,
-            curves=tuple(Curve(style, *line_of(spans, style != "label")) for style, _, spans in bars),
             rows=("label", "alarm"),
-            x_limits=panels[0].x_limits,
+            x_limits=limits,
             zoom="time",
         )
     )
-    keys = [(f"joint_{k}", names[j]) for k, j in enumerate(joints, start=1)]
-    keys += [("sensor", "reference sensor")] if sensor else []
-    keys += [(style, meaning) for style, meaning, _ in bars]
-    return Sheet("score", "contacts", f"{scored.subject.finger.name}: {track.recording.path.name}", keys, panels)
+    return Sheet("score", "contacts", f"{scored.subject.finger.name}: {track.recording.path.name}", panels)
 
 
 def _detection(
     track: Track, score: DetectionScore, shown: NDArray[np.bool_], labelled: list[tuple[float, float]]
-) -> list[tuple[str, str, list[tuple[float, float]]]]:
-    """Return (style, meaning, stretches) of labels and alarms; those without a stretch are left out."""
+) -> Iterator[Trace]:
+    """Draw labels and alarms, those that have a stretch."""
     time, alarm = track.recording.time, track.alarm & shown
     found, others = _by_event(track, score)
-    bars = [
-        ("label", "contact, as labelled", labelled),
-        ("alarm", "alarm, event found", flagged_stretches(time, alarm & found)),
-        ("missed", "alarm, event missed", flagged_stretches(time, alarm & others & ~found)),
-        ("false_alarm", "alarm without contact", flagged_stretches(time, alarm & ~others & ~found)),
-    ]
-    return [bar for bar in bars if bar[2]]
+    for row, meaning, colour, spans in (
+        (0, "contact, as labelled", SAND, labelled),
+        (1, "alarm, event found", BLUE, flagged_stretches(time, alarm & found)),
+        (1, "alarm, event missed", GREY, flagged_stretches(time, alarm & others & ~found)),
+        (1, "alarm without contact", VERMILION, flagged_stretches(time, alarm & ~others & ~found)),
+    ):
+        if spans:
+            yield lane(spans, row, meaning, colour)
 
 
 def _busiest(track: Track, score: DetectionScore) -> tuple[int, int, float]:
@@ -186,37 +200,34 @@ def event_sheet(scored: Scored) -> Sheet:
     borders = np.cumsum([0, *groups.values()])
     middles = 0.5 * (borders[:-1] + borders[1:]) - 0.5
     rows, inside, half = np.arange(float(count)), length < end, 0.36
-    panel = Panel(
-        title="Compensated torque, all joints",
-        alt=f"Compensated torque of {counted(count, 'event')} from their onset on, and the first alarm of each",
-        x_label="time from the onset (s)",
-        y_label="",
+    most = float(np.nanquantile(torque, 0.99))
+    ends, onset, top = np.array([-BEFORE, end]), "onset, and end of the event", np.array([-0.5, count - 0.5])
+    shown = panel(
+        "Compensated torque, all joints",
+        f"Compensated torque of {counted(count, 'event')} from their onset on, and the first alarm of each",
+        "time from the onset (s)",
+        "",
+        heat(torque, grid, rows, _HEAT, (0.0, most), "mN·m"),
+        bars(delay, rows - half, rows + half, "first alarm", VERMILION, 2.6),
+        bars(length[inside], rows[inside] - half, rows[inside] + half, onset, DARK, 1.6),
+        curve(np.zeros(2), top, onset, DARK, 1.6),
+        *(
+            curve(ends, np.full(2, each - 0.5), "", GREY, 1.1, "dash")
+            for each in np.unique(borders)
+            if 0 < each < count
+        ),
+        note=f"white: 0, dark blue: {most:.3g} mN·m and more",
         size="wide",
         height=int(min(max(280, 150 + 30 * count), 900)),
-        heat=Heat(torque, grid, rows, _HEAT, 0.0, float(np.nanquantile(torque, 0.99)), "mN·m"),
-        curves=(
-            Curve("onset", np.zeros(2), np.array([-0.5, count - 0.5])),
-            *(
-                Curve("start", np.array([-BEFORE, end]), np.full(2, border - 0.5))
-                for border in np.unique(borders)
-                if 0 < border < count
-            ),
-        ),
-        bars=(
-            Bars("onset", length[inside], rows[inside] - half, rows[inside] + half),
-            Bars("first_alarm", delay, rows - half, rows + half),
-        ),
-        y_ticks=tuple(
+        y_ticks=[
             (float(middle), f"{number} {name}")
             for middle, (name, number) in zip(middles, groups.items(), strict=True)
             if number
-        ),
+        ],
         x_limits=(-BEFORE, end),
         y_limits=(count - 0.5, -0.5),
-        note=f"white: 0, dark blue: {float(np.nanquantile(torque, 0.99)):.3g} mN·m and more",
     )
-    keys = (("first_alarm", "first alarm"), ("onset", "onset, and end of the event"))
-    return Sheet("score", "events", f"{scored.subject.finger.name}: {counted(count, 'event')}", keys, [panel])
+    return Sheet("score", "events", f"{scored.subject.finger.name}: {counted(count, 'event')}", [shown])
 
 
 def _order(event: Event) -> tuple[int, float]:
@@ -245,52 +256,44 @@ def roc_sheet(scored: Scored, points: Sequence[RocPoint]) -> Sheet:
     in_alarm = 100.0 * np.array([point.free_alarm_share for point in points])
     own = [int(np.argmin(np.abs(np.log(factors))))]
     named, least = _named(points), 60.0 / minutes  # one alarm in all free time, 1/h
-    against = Panel(
-        title="Events found, over false alarms",
-        alt="Share of the events that are found over the rate of false alarms, at several factors on all thresholds",
-        x_label="false alarms per hour of free time",
-        y_label="events found (%)",
+    against = panel(
+        "Events found, over false alarms",
+        "Share of the events that are found over the rate of false alarms, at several factors on all thresholds",
+        "false alarms per hour of free time",
+        "events found (%)",
+        bars(rate, found_low, found_high, "", _INTERVAL),
+        bars(found, rate_low, rate_high, "", _INTERVAL, lying=True),
+        curve(rate, found, "", SKY, 1.5),
+        dots(rate, found),
+        dots(rate[named], found[named], texts=[f"×{factors[k]:g}" for k in named]),
+        dots(rate[own], found[own], "the description's thresholds", VERMILION),
         size="medium",
         height=400,
-        curves=(Curve("predicted", rate, found),),
-        bars=(Bars("interval", rate, found_low, found_high), Bars("interval", found, rate_low, rate_high, lying=True)),
-        dots=(
-            Dots("after_dots", rate, found),
-            Dots("after_dots", rate[named], found[named], tuple(f"×{factors[k]:g}" for k in named)),
-            Dots("own_dots", rate[own], found[own]),
-        ),
         near_x=least,
         x_limits=(-0.15 * least, 2.0 * max(float(rate_high.max()), least)),
         y_limits=(-3.0, 103.0),
     )
-    over = Panel(
-        title="Over the factor on all thresholds",
-        alt="Share of the events that are found, and of the free time in alarm, over a factor on all thresholds",
-        x_label="factor on all thresholds",
-        y_label="share (%)",
+    masked = 100.0 * np.array([point.masked / point.events for point in points])
+    over = panel(
+        "Over the factor on all thresholds",
+        "Share of the events that are found, and of the free time in alarm, over a factor on all thresholds",
+        "factor on all thresholds",
+        "share (%)",
+        band(factors, found_low, found_high, "95 % interval"),
+        curve(factors, found, "events found", BLUE, 1.8),
+        curve(factors, in_alarm, "free time in alarm", VERMILION, 1.8),
+        curve(factors, masked, "missed: in alarm before", GREY, 1.4, "dash"),
+        dots(factors, found),
+        dots(factors, in_alarm, "", VERMILION),
+        mark(1.0),
         size="medium",
         height=400,
-        bands=(Band("confidence", factors, found_low, found_high),),
-        curves=(
-            Curve("fitted", factors, found),
-            Curve("negative", factors, in_alarm),
-            Curve("share", factors, 100.0 * np.array([point.masked / point.events for point in points])),
-        ),
-        dots=(Dots("after_dots", factors, found), Dots("before_dots", factors, in_alarm)),
-        ticks=tuple((factor, f"{factor:g}") for factor in (*NAMED, 8.0) if factors.min() <= factor <= factors.max()),
+        x_ticks=[(factor, f"{factor:g}") for factor in (*NAMED, 8.0) if factors.min() <= factor <= factors.max()],
         log_x=True,
-        line=1.0,
         y_limits=(-3.0, 103.0),
     )
-    keys = (
-        ("own_dots", "the description's thresholds"),
-        ("fitted", "events found"),
-        ("confidence", "95 % interval"),
-        ("negative", "free time in alarm"),
-        ("share", "missed: in alarm before"),
-    )
     title = f"{scored.subject.finger.name}: {events}, {minutes:.3g} min of free time"
-    return Sheet("score", "roc", title, keys, [against, over])
+    return Sheet("score", "roc", title, [against, over])
 
 
 def _named(points: Sequence[RocPoint]) -> list[int]:
@@ -313,31 +316,23 @@ def delay_sheet(scored: Scored) -> Sheet:
     later, ms = int((delays > end).sum()), 1e3 * delays
     share, low, high = with_ends((statistics_intervals.share(k, total) for k in range(1, len(delays) + 1)), 100.0)
     top = min(100.0, 1.3 * float(high.max()))
-    marks = (("limit", median), ("ninety", ninety))
-    panel = Panel(
-        title="Found so far",
+    marks = ((median, f"median {1e3 * median:.0f} ms", ""), (ninety, f"90 % within {1e3 * ninety:.0f} ms", "dash"))
+    shown = panel(
+        "Found so far",
+        f"Share of all events found within a time: half within {1e3 * median:.0f} ms",
+        "delay from the onset (ms)",
+        "share of events (%)",
+        band(np.repeat(ms, 2)[1:], np.repeat(low, 2)[:-1], np.repeat(high, 2)[:-1], "95 % interval"),
+        curve(*_stairs(ms, share), "found so far", BLUE, 1.8),
+        *(curve(np.full(2, 1e3 * at), np.array([0.0, top]), name, VERMILION, 1.3, dash) for at, name, dash in marks),
         note=f"{later} later, up to {ms[-1]:.0f} ms →" if later else "",
-        alt=f"Share of all events found within a time: half within {1e3 * median:.0f} ms",
-        x_label="delay from the onset (ms)",
-        y_label="share of events (%)",
         size="wide",
         height=330,
-        bands=(Band("confidence", np.repeat(ms, 2)[1:], np.repeat(low, 2)[:-1], np.repeat(high, 2)[:-1]),),
-        curves=(
-            Curve("fitted", *_stairs(ms, share)),
-            *(Curve(style, np.full(2, 1e3 * delay), np.array([0.0, top])) for style, delay in marks),
-        ),
         x_limits=(0.0, 1.03e3 * max(end, 1e-3)),
         y_limits=(0.0, top),
     )
-    keys = (
-        ("fitted", "found so far"),
-        ("confidence", "95 % interval"),
-        ("limit", f"median {1e3 * median:.0f} ms"),
-        ("ninety", f"90 % within {1e3 * ninety:.0f} ms"),
-    )
     title = f"{scored.subject.finger.name}: {len(delays)} of {counted(total, 'event')} found"
-    return Sheet("score", "delays", title, keys, [panel])
+    return Sheet("score", "delays", title, [shown])
 
 
 def _stairs(x: Numbers, y: Numbers) -> tuple[Numbers, Numbers]:

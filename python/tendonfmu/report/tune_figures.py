@@ -8,7 +8,7 @@ import numpy as np
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.detect import ContactTuning, tune_report
-from tendonfmu.drawing import Band, Curve, Dots, Panel, Sheet
+from tendonfmu.drawing import BLUE, DARK, VERMILION, Sheet, band, curve, dots, mark, panel
 from tendonfmu.report.page import write_figures
 
 PAGE = "tuning.html"
@@ -30,31 +30,23 @@ def tail_sheet(tuning: ContactTuning) -> Sheet:
         return np.array([point[name] for point in tail], dtype=float)
 
     factors, intervals = column("factor"), column("interval")
-    found, ends = report["kept_out"]["per_hour"], factors[[0, -1]]
-    panel = Panel(
-        title="False alarms",
-        alt="False alarms per hour over a factor on the chosen bounds, in motion that was kept out",
-        x_label="factor on the chosen bounds",
-        y_label="false alarms per hour",
+    found, asked, ends = report["kept_out"]["per_hour"], report["false_alarms_per_hour"], factors[[0, -1]]
+    shown = panel(
+        "False alarms",
+        "False alarms per hour over a factor on the chosen bounds, in motion that was kept out",
+        "factor on the chosen bounds",
+        "false alarms per hour",
+        band(factors, intervals[:, 0], intervals[:, 1], "95 % interval"),
+        curve(factors, column("per_hour"), "kept out", BLUE, 1.8),
+        curve(ends, np.full(2, asked), f"asked for: {asked:.3g} per hour", VERMILION, 1.3, "dash"),
+        dots(np.ones(1), np.array([found]), f"found: {found:.3g} per hour", DARK),
+        mark(1.0),
         size="wide",
         height=480,
-        bands=(Band("confidence", factors, intervals[:, 0], intervals[:, 1]),),
-        curves=(
-            Curve("fitted", factors, column("per_hour")),
-            Curve("ninety", ends, np.full(2, report["false_alarms_per_hour"])),
-        ),
-        dots=(Dots("dark_dots", np.ones(1), np.array([found])),),
         log_x=True,
         near_y=60.0 / report["minutes"],
-        line=1.0,
         x_limits=(float(min(ends[0], 0.9)), float(max(ends[1], 1.1))),
         y_limits=(0.0, 1.1 * float(max(intervals.max(), found))),
     )
-    keys = (
-        ("fitted", "kept out"),
-        ("confidence", "95 % interval"),
-        ("ninety", f"asked for: {report['false_alarms_per_hour']:.3g} per hour"),
-        ("dark_dots", f"found: {found:.3g} per hour"),
-    )
     title = f"{report['finger']}: {report['minutes']:.0f} min of free motion, {report['method']}"
-    return Sheet("tune", "tail", title, keys, [panel])
+    return Sheet("tune", "tail", title, [shown])

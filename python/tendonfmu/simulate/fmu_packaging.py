@@ -14,22 +14,20 @@ from tendonfmu.files import counted, whole_file
 from tendonfmu.fmu import (
     NOT_IN_XML,
     VariableTable,
-    draw_pictures,
     elements,
     find_binaries,
     group_sizes,
     guid,
+    illustrations,
     licenses,
     model_description,
     model_identifier,
     pack,
     package_file,
     read_table,
-    render_documentation,
-    terminals_and_icons,
     units_of,
 )
-from tendonfmu.model import count, native
+from tendonfmu.model import native
 from tendonfmu.simulate.plant import INTEGRATORS, Plant, Settings, refused_by
 from tendonfmu.simulate.rig import Rig, read_rig
 
@@ -61,15 +59,11 @@ def plant_members(rig: Rig, *, binaries: Path | None = None) -> dict[str, bytes]
         "source_files": [],
         "sample_at": "begin",
     }
-    page = render_documentation("plant_documentation.html.jinja", context, summary=count(rig.finger), rig=rig)
-    pictures, icon = draw_pictures(rig.finger)
     libraries = find_binaries(binaries, BINARIES, BINARY_STEM, identifier)
     return {
         "modelDescription.xml": model_description(context),
-        **pictures,
-        "documentation/index.html": page.encode(),
         "resources/rig.json": text,
-        **terminals_and_icons(context["variables"], icon),
+        **illustrations(rig.finger, "plant_documentation.html.jinja", context, rig=rig),
         **licenses("license.txt", "third_party.txt"),
         **{f"binaries/{path}": data for path, data in libraries.items()},
     }
