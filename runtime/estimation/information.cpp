@@ -6,10 +6,10 @@
 #include <condition_variable>
 #include <exception>
 #include <mutex>
+#include <stdexcept>
 #include <thread>
 
 #include "joint_sum.h"
-#include "refusal.h"
 #include "sample_rows.h"
 
 namespace tendonfmu::estimation {
@@ -323,7 +323,8 @@ class data_pass {
 
 }  // namespace
 
-fit_problem::fit_problem(const void* data, std::size_t size, const std::int32_t* group, const double* scale)
+fit_problem::fit_problem(const void* data, std::size_t size, const std::vector<std::int32_t>& group,
+                         const numbers& scale)
     : image(static_cast<const unsigned char*>(data), static_cast<const unsigned char*>(data) + size),
       finger(data, size),
       unknowns(finger.get(), group, scale),
@@ -359,7 +360,7 @@ std::size_t fit_problem::samples() const {
 cost_evaluation evaluate(const fit_problem& problem, const std::vector<double>& z, const pass_options& options,
                          const pass_watch& watch) {
   if (problem.recordings.empty()) {
-    throw refused("no recording: expected at least one");
+    throw std::invalid_argument("no recording: expected at least one");
   }
   data_pass pass(problem, z, options);
   cost_evaluation result;

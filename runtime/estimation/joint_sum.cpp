@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "symmetric_update.h"
+#include "products.h"
 
 namespace tendonfmu::estimation {
 namespace {
@@ -128,7 +128,7 @@ void joint_sum::sum_block(Eigen::MatrixXd* sum) {
   const std::vector<std::size_t>& active = rows.active();
   const std::size_t count = active.size();
   std::fill_n(product_.begin(), count * count, 0.0);
-  add_outer_products(product_.data(), count, rows.row(0), used_, rows.stride(), 1.0);
+  best_products().add_outer_products(product_.data(), count, rows.row(0), used_, rows.stride(), 1.0);
   for (std::size_t c = 0; c < count; ++c) { /* on either side of the diagonal: to look which takes as long as to add */
     double* column = sum->col(static_cast<Eigen::Index>(active[c])).data();
     const double* product = product_.data() + c * count;
@@ -162,7 +162,7 @@ void joint_sum::end_block(Eigen::MatrixXd* sum) {
 }
 
 void joint_sum::flush() {
-  add_outer_products(dense_sum_.data(), held_.size(), dense_.data(), dense_count_, held_.size(), 1.0);
+  best_products().add_outer_products(dense_sum_.data(), held_.size(), dense_.data(), dense_count_, held_.size(), 1.0);
   dense_count_ = 0;
 }
 

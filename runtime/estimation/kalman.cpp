@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "symmetric_update.h"
+#include "products.h"
 
 namespace tendonfmu::estimation {
 
@@ -82,8 +82,8 @@ void kalman_filter::start_bias(const double* bias, const double* rows, double va
     bias_[j] = bias[j] + offset(rows_.data() + j * order());
     std::fill_n(rows_.begin() + static_cast<std::ptrdiff_t>(j * order() + p), n, 0.0);
   }
-  multiply_symmetric(product_.data(), order(), covariance_.data(), order(), rows_.data(), n, order());
-  multiply_transposed(inner_.data(), n, rows_.data(), n, order(), product_.data(), n, order(), order());
+  best_products().multiply_symmetric(product_.data(), order(), covariance_.data(), order(), rows_.data(), n, order());
+  best_products().multiply_transposed(inner_.data(), n, rows_.data(), n, order(), product_.data(), n, order(), order());
   for (std::size_t j = 0; j < n; ++j) {
     for (std::size_t i = 0; i < p; ++i) {
       at(p + j, i) = product_[j * order() + i];
@@ -141,8 +141,10 @@ bool kalman_filter::update() {
     at(i, i) += settings_.parameter_drift * elapsed_;
   }
   const std::size_t rows = measured + (jumped_ ? n : 0);
-  multiply_symmetric(product_.data(), order(), covariance_.data(), order(), rows_.data(), rows, order());
-  multiply_transposed(inner_.data(), rows, rows_.data(), rows, order(), product_.data(), rows, order(), order());
+  best_products().multiply_symmetric(product_.data(), order(), covariance_.data(), order(), rows_.data(), rows,
+                                     order());
+  best_products().multiply_transposed(inner_.data(), rows, rows_.data(), rows, order(), product_.data(), rows, order(),
+                                      order());
   propagate(rows);
   add_noise(rows);
   if (!factor(rows)) {
@@ -150,7 +152,7 @@ bool kalman_filter::update() {
   }
   find_innovations(rows);
   whiten(rows);
-  add_outer_products(covariance_.data(), order(), product_.data(), measured, order(), -1.0);
+  best_products().add_outer_products(covariance_.data(), order(), product_.data(), measured, order(), -1.0);
   correct();
   updated_ = gathered_;
   gathered_ = 0;
@@ -241,42 +243,28 @@ void kalman_filter::find_innovations(std::size_t rows) {
   }
 }
 
-/* W = L⁻¹ times the products, in their place: a sample at a time, what the samples before it predict is subtracted at
- * once
- */
+/* W = L⁻¹ times the products, in their place; of measurements that are not used nothing */
 void kalman_filter::whiten(std::size_t rows) {
-  const std::size_t n = settings_.joints;
-  double* w = product_.data();
-  for (std::size_t first = 0; first < gathered_ * n; first += n) {
-    if (!use_[first / n]) {
-      std::fill_n(w + first * order(), n * order(), 0.0);
-      continue;
-    }
-    add_weighted_rows(w + first * order(), order(), n, inner_.data() + first * rows, rows, w, first, order(), order(),
-                      -1.0);
-    for (std::size_t row = first; row < first + n; ++row) {
-      const double* l = inner_.data() + row * rows;
-      double* own = w + row * order();
-      for (std::size_t k = first; k < row; ++k) {
-        const double* other = w + k * order();
-        for (std::size_t i = 0; i < order(); ++i) {
-          own[i] -= l[k] * other[i];
-        }
-      }
-      const double inverse = 1.0 / l[row];
-      for (std::size_t i = 0; i < order(); ++i) {
-        own[i] *= inverse;
-      }
+  const std::size_t measured = gathered_ * settings_.joints;
+  for (std::size_t row = 0; row < measured; ++row) {
+    if (!use_[row / settings_.joints]) {
+      std::fill_n(product_.begin() + static_cast<std::ptrdiff_t>(row * order()), order(), 0.0);
+      std::fill_n(inner_.begin() + static_cast<std::ptrdiff_t>(row * rows), row, 0.0);
+      inner_[row * rows + row] = 1.0;
     }
   }
+  best_products().solve_lower(inner_.data(), rows, product_.data(), measured, order(), order());
 }
 
 /* z and b += W·L⁻¹(y − ŷ), within the bounds */
 void kalman_filter::correct() {
   const std::size_t p = settings_.unknowns, n = settings_.joints;
   std::fill(correction_.begin(), correction_.end(), 0.0);
-  add_weighted_rows(correction_.data(), order(), 1, white_.data(), white_.size(), product_.data(), gathered_ * n,
-                    order(), order(), 1.0);
+  for (std::size_t row = 0; row < gathered_ * n; ++row) {
+    for (std::size_t i = 0; i < order(); ++i) {
+      correction_[i] += white_[row] * product_[row * order() + i];
+    }
+  }
   keep_within_bounds();
   for (std::size_t i = 0; i < p; ++i) {
     z_[i] = std::clamp(z_[i] + settings_.scale[i] * correction_[i], settings_.lower[i], settings_.upper[i]);

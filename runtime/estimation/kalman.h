@@ -99,7 +99,7 @@ class kalman_filter {
   std::vector<double> z_, bias_, start_;
   bool settled_ = false;                /* linearised at the anchor */
   std::vector<double> anchor_, offset_; /* [p]; (z − anchor)/scale while a block is gathered */
-  std::vector<double> covariance_;      /* of (z/scale, b): lower triangle, as symmetric_update.h has it */
+  std::vector<double> covariance_;      /* of (z/scale, b): lower triangle, as products.h has it */
   /* what is gathered; rows of the state's order, samples × joints of them and one more sample's for the jumps */
   std::size_t gathered_ = 0, updated_ = 0;
   bool jumped_ = false;
