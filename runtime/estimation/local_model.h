@@ -54,10 +54,10 @@ class local_model {
  private:
   /* One side of a law with a rate to estimate, in the description's units. */
   struct stribeck_side {
-    Eigen::Index rate, drop;                              /* unknowns; drop −1: fixed */
-    Eigen::Index rate_column, drop_column, square_column; /* of the Gram matrix; the cubic one follows the square */
-    double at;                                            /* drop at x */
-    double per_drop;                                      /* 1/(at · sides that share the rate), 0 without a drop */
+    Eigen::Index rate, drop;                 /* unknowns; drop −1: fixed */
+    Eigen::Index rate_column, square_column; /* of the Gram matrix; the cubic one follows the square */
+    double at;                               /* drop at x */
+    double per_drop;                         /* 1/(at · sides that share the rate), 0 without a drop */
   };
 
   void linearise(const Eigen::VectorXd& step, Eigen::VectorXd* pull, Eigen::VectorXd* gradient,

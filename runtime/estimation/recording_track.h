@@ -6,11 +6,6 @@
 
 namespace tendonfmu::estimation {
 
-struct finger_deleter {
-  void operator()(tendonfmu_finger* finger) const { tendonfmu_destroy(finger); }
-};
-using finger_pointer = std::unique_ptr<tendonfmu_finger, finger_deleter>;
-
 /* A finger of the core that never detects contact. */
 class free_finger {
  public:
@@ -31,7 +26,7 @@ class free_finger {
   std::vector<unsigned char> save() const;
 
  private:
-  finger_pointer finger_;
+  std::unique_ptr<tendonfmu_finger, void (*)(tendonfmu_finger*)> finger_{nullptr, tendonfmu_destroy};
   std::vector<std::size_t> changed_; /* of a call of set(): parameters and their new values */
   std::vector<double> values_;
 };

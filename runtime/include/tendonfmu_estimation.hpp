@@ -186,8 +186,8 @@ using learner_watch = std::function<bool(std::size_t samples_done, std::size_t s
  * Blocks: samples are gathered and taken in `block` at a time, linearised at the unknowns that the block before left;
  * within a block nothing else is neglected. After 10 s at 1 kHz of an index finger (468 unknowns, all 20 % off at the
  * start), blocks of 8 differ from samples taken one by one by 0.008 standard errors (rms; at most 0.08) and 1e-4 N·m of
- * bias; of 32 by 0.01 (at most 0.1). A step that completes a block of 8 takes 0.4 ms there, the other steps 6 µs
- * (one core with AVX2; 1.1 ms without; with 37 unknowns 10 µs and 1 µs).
+ * bias; of 32 by 0.01 (at most 0.1). A step that completes a block of 8 takes some 1 ms there, the other steps 10 µs
+ * (one core with AVX2; 2 ms without).
  *
  * A sample at which the model finds a tendon slack (a force below 0; the paper: "the training should be modified
  * whenever this appears") is not used, only counted.
