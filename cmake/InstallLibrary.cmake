@@ -12,8 +12,8 @@ set_target_properties(tendonfmu_description PROPERTIES EXPORT_NAME description)
 install(TARGETS tendonfmu_core tendonfmu_description EXPORT tendonfmuTargets
         ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}" INCLUDES DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
 install(DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}/runtime/include/" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}"
-        FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp" PATTERN "tendonfmu_plant.h" EXCLUDE PATTERN "tendonfmu_estimation.h" EXCLUDE
-        PATTERN "tendonfmu_learner.h" EXCLUDE)
+        FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp" PATTERN "tendonfmu_plant.h" EXCLUDE
+        PATTERN "tendonfmu_estimation.hpp" EXCLUDE)
 
 install(FILES LICENSE THIRD_PARTY_LICENSES.txt DESTINATION "${CMAKE_INSTALL_DOCDIR}")
 
@@ -31,8 +31,7 @@ if(TARGET tendonfmu_estimation)
   set_target_properties(tendonfmu_estimation PROPERTIES EXPORT_NAME estimation)
   tendonfmu_forget(tendonfmu_estimation "$<LINK_ONLY:Eigen3::Eigen>") # header-only
   install(TARGETS tendonfmu_estimation EXPORT tendonfmuTargets ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}")
-  install(FILES runtime/include/tendonfmu_estimation.h runtime/include/tendonfmu_learner.h
-          DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
+  install(FILES runtime/include/tendonfmu_estimation.hpp DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
 endif()
 
 # The simulated finger, where it was built, with the archives of SUNDIALS that it was linked with.

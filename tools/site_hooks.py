@@ -17,12 +17,11 @@ from site_notebooks import SOURCES, notebook_pages, page_of
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
 HEADERS = (
-    "tendonfmu",
-    "tendonfmu_outputs",
-    "tendonfmu_description",
-    "tendonfmu_estimation",
-    "tendonfmu_learner",
-    "tendonfmu_plant",
+    "tendonfmu.h",
+    "tendonfmu_outputs.h",
+    "tendonfmu_description.h",
+    "tendonfmu_estimation.hpp",
+    "tendonfmu_plant.h",
 )
 _MARK = re.compile(r"<!-- headers: .*? -->")
 _LINK = re.compile(r"(?<!!)\[((?:[^\[\]]|\[[^\]]*\])+)\]\(([^)\s#:]+)(#[^)\s]*)?\)")
@@ -41,8 +40,9 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
 
 
 def headers() -> str:
-    texts = {name: (ROOT / "runtime" / "include" / f"{name}.h").read_text(encoding="utf-8") for name in HEADERS}
-    return "\n".join(f"### `{name}.h`\n\n```c\n{text}```\n" for name, text in texts.items())
+    texts = {name: (ROOT / "runtime" / "include" / name).read_text(encoding="utf-8") for name in HEADERS}
+    language = {".h": "c", ".hpp": "cpp"}
+    return "\n".join(f"### `{name}`\n\n```{language[Path(name).suffix]}\n{text}```\n" for name, text in texts.items())
 
 
 def shown(link: re.Match[str], page: Any) -> str:

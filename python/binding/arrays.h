@@ -22,13 +22,23 @@ using number_rows = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::dev
 using number_row = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using flag_row = nb::ndarray<const unsigned char, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
+// Values as a numpy array of this shape; empty: of one dimension.
+template <typename Value>
+nb::object as_array(std::vector<Value> values, std::vector<std::size_t> shape = {}) {
+  if (shape.empty()) {
+    shape = {values.size()};
+  }
+  auto* kept = new std::vector<Value>(std::move(values));
+  nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<Value>*>(p); });
+  return nb::cast(nb::ndarray<nb::numpy, Value>(kept->data(), shape.size(), shape.data(), owner));
+}
+
 // A new numpy array of zeros, and its values.
 template <typename Value>
 std::pair<nb::object, Value*> new_array(const std::vector<std::size_t>& shape) {
-  const std::size_t count = std::accumulate(shape.begin(), shape.end(), std::size_t{1}, std::multiplies<>());
-  auto* kept = new std::vector<Value>(count);
-  nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<Value>*>(p); });
-  return {nb::cast(nb::ndarray<nb::numpy, Value>(kept->data(), shape.size(), shape.data(), owner)), kept->data()};
+  std::vector<Value> values(std::accumulate(shape.begin(), shape.end(), std::size_t{1}, std::multiplies<>()));
+  Value* data = values.data();
+  return {as_array(std::move(values), shape), data};
 }
 
 // What tendonfmu_<thing>_create() gave. create(message, message_size) calls it; its refusal is a ValueError.

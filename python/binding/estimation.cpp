@@ -1,195 +1,275 @@
-// The C interface of the estimation as the Python module _estimation: numpy arrays in and out.
-#include <algorithm>
+// The estimation (tendonfmu_estimation.hpp) as the Python module _estimation: numpy arrays in and out.
+#include <nanobind/stl/unique_ptr.h>
 
-#include "estimation_arrays.h"
+#include "arrays.h"
+#include "tendonfmu_estimation.hpp"
 
 namespace {
 
-class bound_estimator : bound_handle<tendonfmu_estimator, tendonfmu_estimator_destroy, tendonfmu_estimator_last_error> {
+using namespace tendonfmu::estimation;
+
+using group_row = nb::ndarray<const std::int32_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+
+template <typename Value>
+std::vector<Value> copied(
+    const std::optional<nb::ndarray<const Value, nb::ndim<1>, nb::c_contig, nb::device::cpu>>& row) {
+  return row ? std::vector<Value>(row->data(), row->data() + row->size()) : std::vector<Value>();
+}
+
+numbers copied(const number_row& row) {
+  return {row.data(), row.data() + row.size()};
+}
+
+const double* data(const std::optional<number_rows>& rows) {
+  return rows ? rows->data() : nullptr;
+}
+
+void expect_rows(const std::optional<number_rows>& rows, std::size_t samples, std::size_t columns, const char* name) {
+  if (rows && (rows->shape(0) != samples || rows->shape(1) != columns)) {
+    throw nb::value_error((std::string(name) + ": expected " + std::to_string(samples) + " rows of " +
+                           std::to_string(columns) + " columns")
+                              .c_str());
+  }
+}
+
+// A recording of an estimator or a learner; the arrays must outlive it.
+template <typename Finger>
+recording_arrays recording_of(const Finger& finger, const number_row& time, const number_rows& force,
+                              const std::optional<number_rows>& position, const std::optional<number_rows>& angle,
+                              const std::optional<number_rows>& velocity, int source,
+                              const std::optional<number_rows>& external, const std::optional<flag_row>& use) {
+  const std::size_t count = time.shape(0), n = finger.joint_count(), m = finger.tendon_count();
+  expect_rows(force, count, m, "tendon_force");
+  expect_rows(position, count, m, "tendon_position");
+  expect_rows(angle, count, n, "joint_position");
+  expect_rows(velocity, count, n, "joint_velocity");
+  expect_rows(external, count, n, "external_torque");
+  if (use && use->shape(0) != count) {
+    throw nb::value_error("use: expected one flag a sample");
+  }
+  return {count,
+          time.data(),
+          {force.data(), data(position), data(angle), data(velocity)},
+          data(external),
+          use ? use->data() : nullptr,
+          source};
+}
+
+// path, role, parameters, start, lower, upper, scale
+template <typename Finger>
+nb::tuple unknown_of(const Finger& finger, std::size_t index) {
+  const unknown_item& u = finger.unknowns().at(index);
+  return nb::make_tuple(u.path, static_cast<int>(u.role), u.parameters, u.start, u.lower, u.upper, u.scale);
+}
+
+// A Python callable that may stop a long call, also by Ctrl-C or by what it raises.
+class python_watch {
  public:
-  bound_estimator(const nb::bytes& image, const std::optional<group_row>& group, const std::optional<number_row>& scale)
-      : bound_handle([&](char* message, std::size_t size) {
-          expect_all_numbers(image, group, scale);
-          return tendonfmu_estimator_create(image.data(), image.size(), group ? group->data() : nullptr,
-                                            scale ? scale->data() : nullptr, message, size);
-        }) {}
+  explicit python_watch(const nb::object& watch) : watch_(watch.is_none() ? nullptr : &watch) {}
 
-  std::size_t joints() const { return tendonfmu_estimator_joint_count(get()); }
-  std::size_t tendons() const { return tendonfmu_estimator_tendon_count(get()); }
-  std::size_t unknowns() const { return tendonfmu_estimator_unknown_count(get()); }
-  std::size_t parameters() const { return tendonfmu_estimator_parameter_count(get()); }
-
-  nb::tuple unknown(std::size_t index) const {
-    tendonfmu_unknown u;
-    expect(tendonfmu_estimator_get_unknown(get(), index, &u));
-    return as_tuple(u);
-  }
-
-  nb::object values(const number_row& z) const {
-    expect_unknowns(z);
-    auto [array, values] = new_array<double>({parameters()});
-    expect(tendonfmu_estimator_get_values(get(), z.data(), values));
-    return array;
-  }
-
-  nb::object unknown_values(const number_row& values) const {
-    check_length(values.shape(0), "values");
-    auto [array, z] = new_array<double>({unknowns()});
-    expect(tendonfmu_estimator_get_unknowns(get(), values.data(), z));
-    return array;
-  }
-
-  std::size_t add_recording(const number_row& time, const number_rows& force,
-                            const std::optional<number_rows>& position, const std::optional<number_rows>& angle,
-                            const std::optional<number_rows>& velocity, int source,
-                            const std::optional<number_rows>& external, const std::optional<flag_row>& use) {
-    const sample_arrays samples{time, force, position, angle, velocity, external, use};
-    samples.check(joints(), tendons());
-    const tendonfmu_inputs inputs = samples.inputs();
-    std::size_t index = 0;
-    expect(tendonfmu_estimator_add_recording(get(), time.shape(0), time.data(), &inputs, source, data(external),
-                                             use ? use->data() : nullptr, &index));
-    lengths_.push_back(time.shape(0));
-    return index;
-  }
-
-  void set_weights(std::size_t recording, const number_row& weight) {
-    if (weight.shape(0) != joints()) {
-      throw nb::value_error(("weight: expected " + std::to_string(joints()) + " numbers, one a joint").c_str());
+  // Without the GIL; `arguments` are made with it. Returns false to stop.
+  template <typename Arguments>
+  bool ask(const Arguments& arguments) {
+    const nb::gil_scoped_acquire gil;
+    try {
+      if (PyErr_CheckSignals() != 0) { /* Ctrl-C */
+        throw nb::python_error();
+      }
+      return !watch_ || !nb::object((*watch_)(*arguments())).is(nb::bool_(false));
+    } catch (nb::python_error& error) {
+      raised_ = std::make_unique<nb::python_error>(std::move(error));
+      return false;
     }
-    expect(tendonfmu_estimator_set_weights(get(), recording, weight.data()));
   }
 
-  void set_known(const number_rows& information) {
-    if (information.shape(0) != unknowns() || information.shape(1) != unknowns()) {
-      throw nb::value_error("information: expected a row and a column for each unknown");
+  // Afterwards, with the GIL: what it raised.
+  void rethrow() {
+    if (raised_) {
+      raised_->restore();
+      throw nb::python_error();
     }
-    expect(tendonfmu_estimator_set_known(get(), information.data()));
-  }
-
-  nb::tuple evaluate(const number_row& z, std::size_t stride, unsigned threads) const {
-    expect_unknowns(z);
-    const std::size_t u = unknowns();
-    double cost = 0.0;
-    auto [gradient, slopes] = new_array<double>({u});
-    auto [information, rows] = new_array<double>({u, u});
-    tendonfmu_status status;
-    {
-      const nb::gil_scoped_release without_gil;
-      status = tendonfmu_estimator_evaluate(get(), z.data(), stride, threads, &cost, slopes, rows);
-    }
-    expect(status);
-    return nb::make_tuple(cost, gradient, information);
-  }
-
-  nb::tuple jacobian(std::size_t recording, const number_row& z, std::size_t first, std::size_t count,
-                     std::size_t length) const {
-    expect_unknowns(z);
-    const std::size_t u = unknowns(), n = joints();
-    auto [torque, torques] = new_array<double>({count, n});
-    auto [jump, jumps] = new_array<double>({count, n});
-    auto [torque_derivative, torque_slopes] = new_array<double>({count, n, u});
-    auto [jump_derivative, jump_slopes] = new_array<double>({count, n, u});
-    expect(tendonfmu_estimator_jacobian(get(), recording, z.data(), first, count, length, torques, jumps, torque_slopes,
-                                        jump_slopes));
-    return nb::make_tuple(torque, jump, torque_derivative, jump_derivative);
-  }
-
-  nb::tuple innovations(std::size_t recording, const number_row& z) const {
-    expect_unknowns(z);
-    const std::size_t samples = recording < lengths_.size() ? lengths_[recording] : 0, n = joints();
-    auto [innovation, innovations] = new_array<double>({samples, n});
-    auto [variance, variances] = new_array<double>({samples});
-    auto [bias, biases] = new_array<double>({samples, n});
-    expect(tendonfmu_estimator_innovations(get(), recording, z.data(), innovations, variances, biases));
-    return nb::make_tuple(innovation, variance, bias);
-  }
-
-  // watch(pass, stride, samples_done, samples, cost, best) -> bool
-  nb::dict fit(const number_row& start, double prior_std, double tolerance, std::size_t passes, std::size_t stride,
-               unsigned threads, const nb::object& watch) const {
-    expect_unknowns(start);
-    const std::size_t u = unknowns();
-    auto [z, best] = new_array<double>({u});
-    auto [gradient, slopes] = new_array<double>({u});
-    auto [information, rows] = new_array<double>({u, u});
-    auto [covariance, covariances] = new_array<double>({u, u});
-    tendonfmu_fit_result result{best, slopes, rows, covariances, 0, 0, 0, 0, 0, 0};
-    const tendonfmu_fit_options options{prior_std, tolerance, passes, stride, threads};
-    fit_watch watching{python_watch(watch), u};
-    tendonfmu_status status;
-    {
-      const nb::gil_scoped_release without_gil;
-      status = tendonfmu_estimator_fit(get(), start.data(), &options, &fit_watch::call, &watching, &result);
-    }
-    watching.watch.rethrow();
-    expect(status);
-    nb::dict fitted;
-    fitted["z"] = z;
-    fitted["gradient"] = gradient;
-    fitted["information"] = information;
-    fitted["covariance"] = covariance;
-    fitted["cost"] = result.cost;
-    fitted["prior_cost"] = result.prior_cost;
-    fitted["passes"] = result.passes;
-    fitted["steps"] = result.steps;
-    fitted["converged"] = result.converged != 0;
-    fitted["stopped"] = result.stopped != 0;
-    return fitted;
   }
 
  private:
-  struct fit_watch {
-    python_watch watch;
-    std::size_t unknowns;
-
-    static int call(void* context, const tendonfmu_fit_progress* p) {
-      auto* self = static_cast<fit_watch*>(context);
-      return self->watch.ask([&] {
-        auto [best, values] = new_array<double>({self->unknowns});
-        std::copy_n(p->best, self->unknowns, values);
-        return nb::make_tuple(p->pass, p->stride, p->samples_done, p->samples, p->cost, best);
-      });
-    }
-  };
-
-  void expect_unknowns(const number_row& z) const {
-    if (z.shape(0) != unknowns()) {
-      throw nb::value_error(("z: expected " + std::to_string(unknowns()) + " unknowns").c_str());
-    }
-  }
-  void check_length(std::size_t length, const char* name) const {
-    if (length != parameters()) {
-      throw nb::value_error((std::string(name) + ": expected " + std::to_string(parameters()) + " numbers").c_str());
-    }
-  }
-
-  std::vector<std::size_t> lengths_;
+  const nb::object* watch_;
+  std::unique_ptr<nb::python_error> raised_;
 };
+
+// watch(pass, stride, samples_done, samples, cost, best) -> bool
+nb::dict fit(const estimator& all, const number_row& start, double prior_std, double tolerance, std::size_t passes,
+             std::size_t stride, unsigned threads, const nb::object& watch) {
+  const std::size_t u = all.unknowns().size();
+  python_watch watching(watch);
+  fit_result result;
+  {
+    const nb::gil_scoped_release without_gil;
+    result = all.fit(copied(start), {prior_std, tolerance, passes, stride, threads}, [&](const fit_progress& p) {
+      return watching.ask(
+          [&] { return nb::make_tuple(p.pass, p.stride, p.samples_done, p.samples, p.cost, as_array(*p.best, {u})); });
+    });
+  }
+  watching.rethrow();
+  for (numbers* matrix : {&result.information, &result.covariance}) {
+    matrix->resize(u * u);
+  }
+  result.gradient.resize(u);
+  nb::dict fitted;
+  fitted["z"] = as_array(std::move(result.z), {u});
+  fitted["gradient"] = as_array(std::move(result.gradient), {u});
+  fitted["information"] = as_array(std::move(result.information), {u, u});
+  fitted["covariance"] = as_array(std::move(result.covariance), {u, u});
+  fitted["cost"] = result.cost;
+  fitted["prior_cost"] = result.prior_cost;
+  fitted["passes"] = result.passes;
+  fitted["steps"] = result.steps;
+  fitted["converged"] = result.converged;
+  fitted["stopped"] = result.stopped;
+  return fitted;
+}
+
+void bind_estimator(nb::module_& m) {
+  nb::class_<estimator>(m, "Estimator")
+      .def(
+          "__init__",
+          [](estimator* all, const nb::bytes& image, const std::optional<group_row>& group,
+             const std::optional<number_row>& scale) {
+            new (all) estimator(image.data(), image.size(), copied(group), copied(scale));
+          },
+          nb::arg("image"), nb::arg("group") = nb::none(), nb::arg("scale") = nb::none())
+      .def_prop_ro("joints", &estimator::joint_count)
+      .def_prop_ro("tendons", &estimator::tendon_count)
+      .def_prop_ro("parameter_count", &estimator::parameter_count)
+      .def_prop_ro("unknown_count", [](const estimator& all) { return all.unknowns().size(); })
+      .def("unknown", &unknown_of<estimator>)
+      .def("values", [](const estimator& all, const number_row& z) { return as_array(all.values(copied(z))); })
+      .def("unknown_values",
+           [](const estimator& all, const number_row& values) { return as_array(all.unknown_values(copied(values))); })
+      .def(
+          "add_recording",
+          [](estimator& all, const number_row& time, const number_rows& force,
+             const std::optional<number_rows>& position, const std::optional<number_rows>& angle,
+             const std::optional<number_rows>& velocity, int source, const std::optional<number_rows>& external,
+             const std::optional<flag_row>& use) {
+            return all.add_recording(recording_of(all, time, force, position, angle, velocity, source, external, use));
+          },
+          nb::arg("time"), nb::arg("tendon_force"), nb::arg("tendon_position") = nb::none(),
+          nb::arg("joint_position") = nb::none(), nb::arg("joint_velocity") = nb::none(),
+          nb::arg("kinematics_source") = 1, nb::arg("external_torque") = nb::none(), nb::arg("use") = nb::none())
+      .def(
+          "set_weights",
+          [](estimator& all, std::size_t recording, const number_row& weight) {
+            all.set_weights(recording, copied(weight));
+          },
+          nb::arg("recording"), nb::arg("weight"))
+      .def(
+          "set_known",
+          [](estimator& all, const number_rows& information) {
+            all.set_known({information.data(), information.data() + information.size()});
+          },
+          nb::arg("information"))
+      .def(
+          "evaluate",
+          [](const estimator& all, const number_row& z, std::size_t stride, unsigned threads) {
+            const std::size_t u = all.unknowns().size();
+            estimator::evaluation at;
+            {
+              const nb::gil_scoped_release without_gil;
+              at = all.evaluate(copied(z), stride, threads);
+            }
+            return nb::make_tuple(at.cost, as_array(std::move(at.gradient)),
+                                  as_array(std::move(at.information), {u, u}));
+          },
+          nb::arg("z"), nb::arg("stride") = 1, nb::arg("threads") = 0)
+      .def("jacobian",
+           [](const estimator& all, std::size_t recording, const number_row& z, std::size_t first, std::size_t count,
+              std::size_t length) {
+             const std::size_t u = all.unknowns().size(), n = all.joint_count();
+             estimator::block_means means = all.jacobian(recording, copied(z), first, count, length);
+             return nb::make_tuple(as_array(std::move(means.torque), {count, n}),
+                                   as_array(std::move(means.jump), {count, n}),
+                                   as_array(std::move(means.torque_derivative), {count, n, u}),
+                                   as_array(std::move(means.jump_derivative), {count, n, u}));
+           })
+      .def("innovations",
+           [](const estimator& all, std::size_t recording, const number_row& z) {
+             estimator::residuals r = all.innovations(recording, copied(z));
+             const std::size_t samples = r.variance.size(), n = all.joint_count();
+             return nb::make_tuple(as_array(std::move(r.innovation), {samples, n}), as_array(std::move(r.variance)),
+                                   as_array(std::move(r.bias), {samples, n}));
+           })
+      .def("fit", &fit, nb::arg("start"), nb::arg("prior_std"), nb::arg("tolerance"), nb::arg("passes"),
+           nb::arg("stride"), nb::arg("threads"), nb::arg("watch") = nb::none());
+}
+
+// innovation and variance [N, n], samples taken; watch(samples_done, samples) -> bool
+nb::tuple run(learner& self, const number_row& time, const number_rows& force,
+              const std::optional<number_rows>& position, const std::optional<number_rows>& angle,
+              const std::optional<number_rows>& velocity, int source, const std::optional<number_rows>& external,
+              const std::optional<flag_row>& use, const nb::object& watch) {
+  const recording_arrays recording = recording_of(self, time, force, position, angle, velocity, source, external, use);
+  const std::size_t n = self.joint_count();
+  numbers innovation(recording.samples * n), variance(innovation);
+  std::size_t done = 0;
+  python_watch watching(watch);
+  {
+    const nb::gil_scoped_release without_gil;
+    done = self.run(recording, innovation.data(), variance.data(), [&](std::size_t row, std::size_t samples) {
+      return watching.ask([&] { return nb::make_tuple(row, samples); });
+    });
+  }
+  watching.rethrow();
+  return nb::make_tuple(as_array(std::move(innovation), {recording.samples, n}),
+                        as_array(std::move(variance), {recording.samples, n}), done);
+}
+
+// What a call writes into two arrays, both [count], or [count] and [count, count].
+template <typename Get>
+nb::tuple two_arrays(std::size_t count, bool square, const Get& get) {
+  numbers first(count), second(square ? count * count : count);
+  get(first.data(), second.data());
+  return nb::make_tuple(as_array(std::move(first)),
+                        square ? as_array(std::move(second), {count, count}) : as_array(std::move(second)));
+}
+
+void bind_learner(nb::module_& m) {
+  nb::class_<learner>(m, "Learner")
+      .def(nb::new_([](const nb::bytes& image, const std::optional<group_row>& group,
+                       const std::optional<number_row>& scale, double prior_std, std::size_t block,
+                       double parameter_drift) {
+             return make_learner(image.data(), image.size(), {prior_std, block, parameter_drift}, copied(group),
+                                 copied(scale));
+           }),
+           nb::arg("image"), nb::arg("group") = nb::none(), nb::arg("scale") = nb::none(), nb::arg("prior_std") = 1.0,
+           nb::arg("block") = 8, nb::arg("parameter_drift") = 0.0)
+      .def_prop_ro("joints", &learner::joint_count)
+      .def_prop_ro("tendons", &learner::tendon_count)
+      .def_prop_ro("unknown_count", [](const learner& self) { return self.unknowns().size(); })
+      .def_prop_ro("slack_samples", &learner::slack_samples)
+      .def("unknown", &unknown_of<learner>)
+      .def("run", &run, nb::arg("time"), nb::arg("tendon_force"), nb::arg("tendon_position") = nb::none(),
+           nb::arg("joint_position") = nb::none(), nb::arg("joint_velocity") = nb::none(),
+           nb::arg("kinematics_source") = 1, nb::arg("external_torque") = nb::none(), nb::arg("use") = nb::none(),
+           nb::arg("watch") = nb::none())
+      .def("begin_pass", &learner::begin_pass)
+      .def("values",
+           [](const learner& self) {
+             return two_arrays(self.parameter_count(), false,
+                               [&](double* values, double* errors) { self.get_values(values, errors); });
+           })
+      .def("unknown_values",
+           [](const learner& self) {
+             return two_arrays(self.unknowns().size(), true,
+                               [&](double* z, double* covariance) { self.get_unknowns(z, covariance); });
+           })
+      .def("bias", [](const learner& self) {
+        return two_arrays(self.joint_count(), false,
+                          [&](double* bias, double* errors) { self.get_bias(bias, errors); });
+      });
+}
 
 }  // namespace
 
 NB_MODULE(_estimation, m) {
+  bind_estimator(m);
   bind_learner(m);
-  nb::class_<bound_estimator>(m, "Estimator")
-      .def(nb::init<const nb::bytes&, const std::optional<group_row>&, const std::optional<number_row>&>(),
-           nb::arg("image"), nb::arg("group") = nb::none(), nb::arg("scale") = nb::none())
-      .def_prop_ro("joints", &bound_estimator::joints)
-      .def_prop_ro("tendons", &bound_estimator::tendons)
-      .def_prop_ro("unknown_count", &bound_estimator::unknowns)
-      .def_prop_ro("parameter_count", &bound_estimator::parameters)
-      .def("unknown", &bound_estimator::unknown)
-      .def("values", &bound_estimator::values)
-      .def("unknown_values", &bound_estimator::unknown_values)
-      .def("add_recording", &bound_estimator::add_recording, nb::arg("time"), nb::arg("tendon_force"),
-           nb::arg("tendon_position") = nb::none(), nb::arg("joint_position") = nb::none(),
-           nb::arg("joint_velocity") = nb::none(), nb::arg("kinematics_source") = 1,
-           nb::arg("external_torque") = nb::none(), nb::arg("use") = nb::none())
-      .def("set_weights", &bound_estimator::set_weights, nb::arg("recording"), nb::arg("weight"))
-      .def("set_known", &bound_estimator::set_known, nb::arg("information"))
-      .def("evaluate", &bound_estimator::evaluate, nb::arg("z"), nb::arg("stride") = 1, nb::arg("threads") = 0)
-      .def("jacobian", &bound_estimator::jacobian)
-      .def("innovations", &bound_estimator::innovations)
-      .def("fit", &bound_estimator::fit, nb::arg("start"), nb::arg("prior_std"), nb::arg("tolerance"),
-           nb::arg("passes"), nb::arg("stride"), nb::arg("threads"), nb::arg("watch") = nb::none());
 }

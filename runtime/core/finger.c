@@ -3,6 +3,7 @@
 
 #include "finger_memory.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -401,22 +402,30 @@ static int say_fixed(const tendonfmu_finger* finger, const model_item* item, uin
   return -1;
 }
 
-/* checks one value on its way into the candidate; sets *routing when it moves a tendon */
-static tendonfmu_status check_candidate(tendonfmu_finger* finger, size_t index, double value, int* routing) {
-  if (!has_parameter(finger, index)) {
-    return TENDONFMU_BAD_ARGUMENT;
+typedef struct candidate_check {
+  const tendonfmu_finger* finger;
+  tendonfmu_status status;
+  int routing; /* something moves a tendon */
+} candidate_check;
+
+/* checks the numbers of an item that are given; the others, NaN in the candidate, stay as they are */
+static int check_candidate(void* context, const model_item* item) {
+  candidate_check* c = context;
+  double* candidate = c->finger->candidate;
+  for (uint32_t i = item->first; i < item->first + item->count; ++i) {
+    if (candidate[i] != candidate[i]) {
+      candidate[i] = c->finger->parameters[i];
+      continue;
+    }
+    if (parameter_check_value(item, i, candidate[i], error_line(c->finger))) {
+      c->status = TENDONFMU_BAD_PARAMETER;
+    } else if (tendonfmu_is_initialised(c->finger) && !parameter_range_of(item, i).tunable) {
+      say_fixed(c->finger, item, i);
+      c->status = TENDONFMU_WRONG_ORDER;
+    }
+    c->routing |= item->kind == ITEM_MOMENT_ARMS;
   }
-  const model_item item = parameter_item(&finger->shape, (uint32_t)index);
-  if (parameter_check_value(&item, (uint32_t)index, value, error_line(finger))) {
-    return TENDONFMU_BAD_PARAMETER;
-  }
-  if (tendonfmu_is_initialised(finger) && !parameter_range_of(&item, (uint32_t)index).tunable) {
-    say_fixed(finger, &item, (uint32_t)index);
-    return TENDONFMU_WRONG_ORDER;
-  }
-  *routing |= item.kind == ITEM_MOMENT_ARMS;
-  finger->candidate[index] = value;
-  return TENDONFMU_OK;
+  return c->status != TENDONFMU_OK;
 }
 
 tendonfmu_status tendonfmu_set_parameters(tendonfmu_finger* finger, size_t count, const size_t* indices,
@@ -424,21 +433,31 @@ tendonfmu_status tendonfmu_set_parameters(tendonfmu_finger* finger, size_t count
   if (!finger || (count && !values)) {
     return missing(finger);
   }
-  const size_t bytes = finger->shape.parameter_count * sizeof(double);
-  int routing = 0;
-  memcpy(finger->candidate, finger->parameters, bytes);
+  candidate_check check = {finger, TENDONFMU_OK, 0};
+  for (size_t i = 0; i < finger->shape.parameter_count; ++i) {
+    finger->candidate[i] = NAN;
+  }
   for (size_t i = 0; i < count; ++i) {
-    const tendonfmu_status status = check_candidate(finger, indices ? indices[i] : i, values[i], &routing);
-    if (status != TENDONFMU_OK) {
-      return status;
+    const size_t index = indices ? indices[i] : i;
+    if (!has_parameter(finger, index)) {
+      return TENDONFMU_BAD_ARGUMENT;
     }
+    if (values[i] != values[i]) {
+      const model_item item = parameter_item(&finger->shape, (uint32_t)index);
+      parameter_check_value(&item, (uint32_t)index, values[i], error_line(finger));
+      return TENDONFMU_BAD_PARAMETER;
+    }
+    finger->candidate[index] = values[i];
+  }
+  if (model_visit(&finger->shape, check_candidate, &check)) {
+    return check.status;
   }
   if (parameter_check_relations(&finger->shape, finger->candidate, error_line(finger)) ||
-      (routing && parameter_check_routing(&finger->shape, finger->candidate, error_line(finger)))) {
+      (check.routing && parameter_check_routing(&finger->shape, finger->candidate, error_line(finger)))) {
     return TENDONFMU_BAD_PARAMETER;
   }
-  memcpy(finger->parameters, finger->candidate, bytes);
-  derive_numbers(finger, routing);
+  memcpy(finger->parameters, finger->candidate, finger->shape.parameter_count * sizeof(double));
+  derive_numbers(finger, check.routing);
   return TENDONFMU_OK;
 }
 

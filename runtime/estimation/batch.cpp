@@ -1,12 +1,12 @@
-#include "batch.h"
-
+/* All recordings at once: maximum likelihood of the model under a weak Gaussian prior, within the unknowns' boxes. Each
+ * pass over the data gives a local model of the cost, whose best step leads to the next. */
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <stdexcept>
 
 #include "local_model.h"
-#include "refusal.h"
 
 namespace tendonfmu::estimation {
 namespace {
@@ -26,9 +26,9 @@ double prior_weight(double prior_std) {
   return std::isinf(prior_std) ? 0.0 : 1.0 / (prior_std * prior_std);
 }
 
-/* information of unknowns, of unknowns divided by their scales; empty: none */
-MatrixXd scaled(const MatrixXd& information, const scaled_box& box) {
-  return information.size() > 0 ? MatrixXd(box.scale.asDiagonal() * information * box.scale.asDiagonal()) : MatrixXd();
+/* a matrix of the unknowns with both sides multiplied by their scales; empty: none */
+MatrixXd scaled(const MatrixXd& matrix, const scaled_box& box) {
+  return matrix.size() > 0 ? MatrixXd(box.scale.asDiagonal() * matrix * box.scale.asDiagonal()) : MatrixXd();
 }
 
 /* A point and what a pass over the data found there. */
@@ -41,14 +41,14 @@ struct search_point {
 
 class batch_search {
  public:
-  batch_search(const fit_problem& problem, const batch_options& options, const batch_watch& watch)
+  batch_search(const fit_problem& problem, const fit_options& options, const fit_watch& watch)
       : problem_(problem),
         options_(options),
         watch_(watch),
         box_(problem.unknowns),
         prior_(prior_weight(options.prior_std), scaled(problem.known, box_)) {}
 
-  batch_result run(const std::vector<double>& start) {
+  fit_result run(const numbers& start) {
     best_.x = box_.clip(
         Eigen::Map<const VectorXd>(start.data(), static_cast<Eigen::Index>(start.size())).cwiseQuotient(box_.scale));
     const std::size_t coarse =
@@ -62,9 +62,10 @@ class batch_search {
     result_.cost = best_.cost;
     result_.prior_cost = best_.prior_cost;
     if (best_.data.complete) {
-      result_.covariance = posterior_covariance(problem_, best_.data.information, options_.prior_std);
+      result_.gradient = copied(best_.data.gradient);
+      result_.information = copied(best_.data.information);
+      result_.covariance = copied(covariance());
     }
-    result_.at = std::move(best_.data);
     return std::move(result_);
   }
 
@@ -122,12 +123,12 @@ class batch_search {
   }
 
   bool look(const VectorXd& x, const pass_options& options, search_point* point) {
-    const std::vector<double> z = box_.unknowns(x);
+    const numbers z = box_.unknowns(x);
     const pass_watch watch = [this, &options](std::size_t done) {
       if (!watch_) {
         return true;
       }
-      const std::vector<double> best = box_.unknowns(best_.x);
+      const numbers best = box_.unknowns(best_.x);
       const double cost = std::isfinite(best_.cost) ? best_.cost : std::numeric_limits<double>::quiet_NaN();
       return watch_({result_.passes + 1, options.stride, done, problem_.samples(), cost, &best});
     };
@@ -145,38 +146,44 @@ class batch_search {
     return true;
   }
 
+  /* (information + prior)^-1, what is known from before included */
+  MatrixXd covariance() const {
+    /* never nothing: what neither data nor prior know must not come out as known exactly */
+    const double weight = std::max(prior_.weight, least_prior_weight);
+    const Eigen::Index p = box_.scale.size();
+    MatrixXd h = scaled(best_.data.information, box_);
+    gaussian_prior(weight, prior_.known).add_to(&h);
+    const Eigen::LDLT<MatrixXd> factor(h);
+    const MatrixXd inverse = factor.solve(MatrixXd::Identity(p, p));
+    return scaled(0.5 * (inverse + inverse.transpose()), box_);
+  }
+
   const fit_problem& problem_;
-  const batch_options& options_;
-  const batch_watch& watch_;
+  const fit_options& options_;
+  const fit_watch& watch_;
   const scaled_box box_;
   const gaussian_prior prior_;
   search_point best_;
-  batch_result result_;
+  fit_result result_;
 };
 
 }  // namespace
 
-MatrixXd posterior_covariance(const fit_problem& problem, const MatrixXd& information, double prior_std) {
-  const scaled_box box(problem.unknowns);
-  /* never nothing: what neither data nor prior know must not come out as known exactly */
-  const double weight = std::max(prior_weight(prior_std), least_prior_weight);
-  const Eigen::Index p = information.rows();
-  MatrixXd h = box.scale.asDiagonal() * information * box.scale.asDiagonal();
-  gaussian_prior(weight, scaled(problem.known, box)).add_to(&h);
-  const Eigen::LDLT<MatrixXd> factor(h);
-  const MatrixXd inverse = factor.solve(MatrixXd::Identity(p, p));
-  return box.scale.asDiagonal() * (0.5 * (inverse + inverse.transpose())) * box.scale.asDiagonal();
-}
-
-batch_result fit_batch(const fit_problem& problem, const std::vector<double>& start, const batch_options& options,
-                       const batch_watch& watch) {
+fit_result estimator::fit(const numbers& start, const fit_options& options, const fit_watch& watch) const {
+  expect_length(start.size(), unknowns().size(), "z", "unknowns");
+  for (std::size_t k = 0; k < start.size(); ++k) {
+    if (std::isnan(start[k])) {
+      throw std::invalid_argument("unknown " + std::to_string(k) + " (" + unknowns()[k].path +
+                                  ") = nan: expected a finite number");
+    }
+  }
   if (!(options.prior_std > 0.0)) {
-    throw refused("prior_std = " + std::to_string(options.prior_std) + ": expected above 0");
+    throw std::invalid_argument("prior_std = " + std::to_string(options.prior_std) + ": expected above 0");
   }
-  if (problem.unknowns.count() == 0) {
-    throw refused("nothing to estimate: expected at least one number that is not fixed");
+  if (start.empty()) {
+    throw std::invalid_argument("nothing to estimate: expected at least one number that is not fixed");
   }
-  return batch_search(problem, options, watch).run(start);
+  return batch_search(*problem_, options, watch).run(start);
 }
 
 }  // namespace tendonfmu::estimation

@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <condition_variable>
-#include <exception>
+#include <future>
 #include <mutex>
+#include <stdexcept>
+#include <system_error>
 #include <thread>
 
 #include "joint_sum.h"
-#include "refusal.h"
 #include "sample_rows.h"
 
 namespace tendonfmu::estimation {
@@ -80,7 +80,7 @@ class pass_worker {
     rows_.read();
     if (rows_.has_jump()) {
       for (std::size_t j = 0; j < joints_.size(); ++j) {
-        joints_[j].rows.jump(residual_column, rows_.jump(j));
+        joints_[j].rows.add(block_rows::bias, residual_column, rows_.jump(j));
       }
     }
     for (const sensitivity_term& term : rows_.terms()) {
@@ -90,11 +90,12 @@ class pass_worker {
       return;
     }
     for (const plain_slope& term : rows_.plain_terms()) {
-      joints_[term.joint].rows.add(columns_.unknown[static_cast<std::size_t>(term.column)], term.slope);
+      joints_[term.joint].rows.add(block_rows::sample, columns_.unknown[static_cast<std::size_t>(term.column)],
+                                   term.slope);
     }
     for (std::size_t j = 0; j < joints_.size(); ++j) {
       const double torque = rows_.measured(j) - recording.external_torque(k, j);
-      joints_[j].rows.add(residual_column, torque - rows_.torque(j));
+      joints_[j].rows.add(block_rows::sample, residual_column, torque - rows_.torque(j));
       joints_[j].filter(gains.gain[k], gains.weight[k] * recording.weight_root(j));
     }
   }
@@ -102,44 +103,28 @@ class pass_worker {
   void add_term(const sensitivity_term& term, bool looked_at) {
     for (std::size_t j = 0; j < joints_.size(); ++j) {
       if (looked_at && term.torque && term.torque[j] != 0.0) {
-        add_row(term, term.torque[j], &joints_[j]);
+        add_slopes(term, term.torque[j], block_rows::sample, &joints_[j].rows);
       }
       if (term.jump && term.jump[j] != 0.0) {
-        add_jump(term, term.jump[j], &joints_[j]);
+        add_slopes(term, -term.jump[j], block_rows::bias, &joints_[j].rows);
       }
     }
   }
 
-  void add_row(const sensitivity_term& term, double factor, joint_sum* joint) const {
-    if (term.side->run_length > 0) {
-      joint->rows.add_run(columns_.unknown[term.side->run_first], term.side->run_length, term.run_slope.data(), factor);
+  void add_slopes(const sensitivity_term& term, double factor, block_rows::part to, block_rows* rows) const {
+    const side_columns& side = *term.side;
+    if (side.run_length > 0) {
+      rows->add_run(to, columns_.unknown[side.run_first], side.run_length, term.run_slope.data(), factor);
     } else {
       for (std::size_t k = 0; k < 4; ++k) {
-        if (term.side->column[k] >= 0) {
-          joint->rows.add(columns_.unknown[static_cast<std::size_t>(term.side->column[k])], factor * term.slope[k]);
+        if (side.column[k] >= 0) {
+          rows->add(to, columns_.unknown[static_cast<std::size_t>(side.column[k])], factor * term.slope[k]);
         }
       }
     }
-    if (expanded_ && term.side->index >= 0) {
+    if (expanded_ && side.index >= 0) {
       const std::array<double, 2> values = expansion(term);
-      joint->rows.add_run(columns_.expansion[static_cast<std::size_t>(term.side->index)], 2, values.data(), factor);
-    }
-  }
-
-  void add_jump(const sensitivity_term& term, double factor, joint_sum* joint) const {
-    if (term.side->run_length > 0) {
-      joint->rows.jump_run(columns_.unknown[term.side->run_first], term.side->run_length, term.run_slope.data(),
-                           -factor);
-    } else {
-      for (std::size_t k = 0; k < 4; ++k) {
-        if (term.side->column[k] >= 0) {
-          joint->rows.jump(columns_.unknown[static_cast<std::size_t>(term.side->column[k])], -factor * term.slope[k]);
-        }
-      }
-    }
-    if (expanded_ && term.side->index >= 0) {
-      const std::array<double, 2> values = expansion(term);
-      joint->rows.jump_run(columns_.expansion[static_cast<std::size_t>(term.side->index)], 2, values.data(), -factor);
+      rows->add_run(to, columns_.expansion[static_cast<std::size_t>(side.index)], 2, values.data(), factor);
     }
   }
 
@@ -221,17 +206,25 @@ class data_pass {
     if (watch && !watch(0)) { /* once at least, however short the pass */
       return false;
     }
-    const pass_team team(this); /* however this ends */
-    std::unique_lock<std::mutex> lock(mutex_);
-    while (!finished_.wait_for(lock, std::chrono::milliseconds(50), [this] { return ended_ == threads_; })) {
-      lock.unlock();
-      if (watch && !watch(done_)) {
-        stopped_ = true;
+    std::vector<std::future<void>> team; /* ended with it, after what ends it */
+    const std::unique_ptr<std::atomic<bool>, void (*)(std::atomic<bool>*)> stop(&stopped_,
+                                                                                [](auto* all) { *all = true; });
+    try {
+      for (std::size_t k = 0; k < threads_; ++k) {
+        team.push_back(std::async(std::launch::async, &data_pass::work, this));
       }
-      lock.lock();
+    } catch (const std::system_error&) { /* the system gives no more threads: fewer do the same */
+      if (team.empty()) {
+        throw;
+      }
     }
-    if (failure_) {
-      std::rethrow_exception(failure_);
+    for (std::future<void>& member : team) {
+      while (member.wait_for(std::chrono::milliseconds(50)) != std::future_status::ready) {
+        if (watch && !watch(done_)) {
+          stopped_ = true;
+        }
+      }
+      member.get();
     }
     return !stopped_;
   }
@@ -239,58 +232,19 @@ class data_pass {
   const MatrixXd& sum() const { return sum_; } /* [q × q] lower triangle */
 
  private:
-  /* The threads, ended with it: a thread that is destroyed while it runs ends the program. */
-  class pass_team {
-   public:
-    explicit pass_team(data_pass* pass) : pass_(pass) {
-      try {
-        for (std::size_t k = 0; k < pass_->threads_; ++k) {
-          threads_.emplace_back([pass] { pass->work(); });
-        }
-      } catch (...) { /* the system gives no more: fewer do the same */
-        if (threads_.empty()) {
-          throw;
-        }
-        const std::lock_guard<std::mutex> lock(pass_->mutex_);
-        pass_->threads_ = threads_.size();
-      }
-    }
-    ~pass_team() {
-      {
-        const std::lock_guard<std::mutex> lock(pass_->mutex_);
-        pass_->stopped_ = pass_->stopped_ || pass_->ended_ < pass_->threads_;
-      }
-      for (std::thread& thread : threads_) {
-        thread.join();
-      }
-    }
-    pass_team(const pass_team&) = delete;
-    pass_team& operator=(const pass_team&) = delete;
-
-   private:
-    data_pass* pass_;
-    std::vector<std::thread> threads_;
-  };
-
-  void work() {
-    try {
-      pass_worker worker(problem_, numbers_, expanded_);
-      for (std::size_t k = next_++; k < tasks_.size() && !stopped_; k = next_++) {
-        const pass_task& task = tasks_[k];
-        auto segment = std::make_unique<segment_sum>(
-            worker.sum(problem_.recordings[task.recording], gains_[task.recording], task.segment, &done_, stopped_));
-        const std::lock_guard<std::mutex> lock(mutex_);
-        waiting_[k] = std::move(segment);
-        join_waiting();
-      }
-    } catch (...) {
+  void work() try {
+    pass_worker worker(problem_, numbers_, expanded_);
+    for (std::size_t k = next_++; k < tasks_.size() && !stopped_; k = next_++) {
+      const pass_task& task = tasks_[k];
+      auto segment = std::make_unique<segment_sum>(
+          worker.sum(problem_.recordings[task.recording], gains_[task.recording], task.segment, &done_, stopped_));
       const std::lock_guard<std::mutex> lock(mutex_);
-      failure_ = std::current_exception();
-      stopped_ = true;
+      waiting_[k] = std::move(segment);
+      join_waiting();
     }
-    const std::lock_guard<std::mutex> lock(mutex_);
-    ++ended_;
-    finished_.notify_one();
+  } catch (...) {
+    stopped_ = true;
+    throw;
   }
 
   /* in the order of the recordings, so that the sum is the same with any number of threads */
@@ -313,17 +267,16 @@ class data_pass {
   std::vector<std::unique_ptr<segment_sum>> waiting_;
   std::vector<VectorXd> held_;
   MatrixXd sum_;
-  std::size_t threads_ = 1, joined_ = 0, ended_ = 0;
+  std::size_t threads_ = 1, joined_ = 0;
   std::atomic<std::size_t> next_{0}, done_{0};
   std::atomic<bool> stopped_{false};
   std::mutex mutex_;
-  std::condition_variable finished_;
-  std::exception_ptr failure_;
 };
 
 }  // namespace
 
-fit_problem::fit_problem(const void* data, std::size_t size, const std::int32_t* group, const double* scale)
+fit_problem::fit_problem(const void* data, std::size_t size, const std::vector<std::int32_t>& group,
+                         const numbers& scale)
     : image(static_cast<const unsigned char*>(data), static_cast<const unsigned char*>(data) + size),
       finger(data, size),
       unknowns(finger.get(), group, scale),
@@ -359,7 +312,7 @@ std::size_t fit_problem::samples() const {
 cost_evaluation evaluate(const fit_problem& problem, const std::vector<double>& z, const pass_options& options,
                          const pass_watch& watch) {
   if (problem.recordings.empty()) {
-    throw refused("no recording: expected at least one");
+    throw std::invalid_argument("no recording: expected at least one");
   }
   data_pass pass(problem, z, options);
   cost_evaluation result;

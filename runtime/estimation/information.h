@@ -34,7 +34,7 @@ struct gram_columns {
 
 /* A finger, its unknowns, its recordings. */
 struct fit_problem {
-  fit_problem(const void* image, std::size_t image_size, const std::int32_t* group, const double* scale);
+  fit_problem(const void* image, std::size_t image_size, const std::vector<std::int32_t>& group, const numbers& scale);
 
   std::vector<unsigned char> image;
   free_finger finger;
@@ -56,6 +56,10 @@ struct cost_evaluation {
   bool complete = false;       /* false: stopped */
 };
 
+inline numbers copied(const Eigen::MatrixXd& values) {
+  return {values.data(), values.data() + values.size()};
+}
+
 /* Called on the caller's thread now and then; false stops. */
 using pass_watch = std::function<bool(std::size_t samples_done)>;
 
@@ -65,7 +69,8 @@ struct pass_options {
   bool expanded = true;   /* false: the columns of the expansion stay 0, which takes a third less time */
 };
 
-/* z [unknowns], within its bounds. The result does not depend on the number of threads. Throws refused. */
+/* z [unknowns], within its bounds. The result does not depend on the number of threads. Throws std::invalid_argument.
+ */
 cost_evaluation evaluate(const fit_problem& problem, const std::vector<double>& z, const pass_options& options,
                          const pass_watch& watch);
 

@@ -3,40 +3,32 @@
 #include <algorithm>
 #include <cmath>
 
-#include "symmetric_update.h"
+#include "products.h"
 
 namespace tendonfmu::estimation {
 namespace {
 
-constexpr std::size_t dense_rows = 32; /* rows of whole blocks summed at a time */
-constexpr std::size_t residual = 0;    /* its column */
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
 
-void add_scaled(const double* from, double factor, double* to, std::size_t count) {
-  for (std::size_t c = 0; c < count; ++c) {
-    to[c] += factor * from[c];
-  }
-}
-
-/* no power of two: rows do not fall onto each other in the cache */
-std::size_t stride_of(std::size_t columns) {
-  return (columns + 7) / 8 * 8 + 8;
-}
+constexpr Index dense_rows = 32;    /* rows of whole blocks summed at a time */
+constexpr std::size_t residual = 0; /* its column */
 
 }  // namespace
 
 block_rows::block_rows(std::size_t columns)
-    : stride_(stride_of(columns)),
+    : stride_((columns + 7) / 8 * 8 + 8), /* no power of two: rows do not fall onto each other in the cache */
       local_(columns, -1),
-      rows_(block_length * stride_, 0.0),
-      row_(stride_, 0.0),
-      held_(stride_, 0.0),
-      mean_(stride_, 0.0) {
+      now_{std::vector<double>(stride_), std::vector<double>(stride_)},
+      rows_(block_length * stride_),
+      mean_(stride_) {
   active_.reserve(columns);
 }
 
 void block_rows::filter(double gain, double weight, std::size_t at) {
   const std::size_t count = active_.size();
-  double *now = row_.data(), *held = held_.data();
+  double *now = now_[sample].data(), *held = now_[bias].data();
   if (weight > 0.0) {
     double* to = rows_.data() + at * stride_;
     for (std::size_t c = 0; c < count; ++c) {
@@ -55,21 +47,20 @@ void block_rows::filter(double gain, double weight, std::size_t at) {
 }
 
 void block_rows::take_off_mean(const double* decay, double squares, std::size_t count) {
-  std::fill_n(mean_.begin(), active_.size(), 0.0);
-  if (!(squares > 0.0)) { /* the bias has begun in this block: nothing from before it counts */
-    return;
-  }
-  for (std::size_t i = 0; i < count; ++i) {
-    add_scaled(row(i), decay[i] / squares, mean_.data(), active_.size());
-  }
-  for (std::size_t i = 0; i < count; ++i) {
-    add_scaled(mean_.data(), -decay[i], rows_.data() + i * stride_, active_.size());
+  const auto columns = static_cast<Index>(active_.size()), stride = static_cast<Index>(stride_);
+  mean_.head(columns).setZero();
+  if (squares > 0.0) { /* else the bias has begun in this block: nothing from before it counts */
+    const Eigen::Map<const VectorXd> c(decay, static_cast<Index>(count));
+    Eigen::Map<MatrixXd, 0, Eigen::OuterStride<>> rows(rows_.data(), columns, c.size(), Eigen::OuterStride<>(stride));
+    mean_.head(columns).noalias() = rows * c / squares;
+    rows.noalias() -= mean_.head(columns) * c.transpose();
   }
 }
 
 void block_rows::clear() {
-  std::fill_n(held_.begin(), active_.size(), 0.0);
-  std::fill_n(row_.begin(), active_.size(), 0.0);
+  for (std::vector<double>& sum : now_) {
+    std::fill_n(sum.begin(), active_.size(), 0.0);
+  }
   for (const std::size_t column : active_) {
     local_[column] = -1;
   }
@@ -81,21 +72,22 @@ joint_sum::joint_sum(std::size_t columns)
     : rows(columns),
       held_(columns),
       cross_(columns),
-      dense_(dense_rows * columns),
-      dense_sum_(columns * columns),
+      dense_(columns, dense_rows),
+      dense_sum_(columns, columns),
       product_(rows.stride() * rows.stride()) {
   begin_segment();
 }
 
 void joint_sum::begin_segment() {
-  for (std::vector<double>* values : {&held_, &cross_, &dense_sum_}) {
-    std::fill(values->begin(), values->end(), 0.0);
-  }
+  held_.setZero();
+  cross_.setZero();
+  dense_sum_.setZero();
   kept_ = block_kept_ = 1.0;
   squares_ = block_squares_ = 0.0;
   rows.clear();
-  used_ = dense_count_ = 0;
-  rows.add(residual, 0.0); /* always the first of the active ones */
+  used_ = 0;
+  dense_count_ = 0;
+  rows.add(block_rows::sample, residual, 0.0); /* always the first of the active ones */
 }
 
 void joint_sum::filter(double gain, double weight) {
@@ -111,24 +103,22 @@ void joint_sum::filter(double gain, double weight) {
 /* z = √C·held − u/√C of all columns, and the block's share of Σ c_i ν_i */
 void joint_sum::pass_on() {
   const double root = std::sqrt(block_squares_), share = kept_ * block_squares_;
-  double* z = dense_.data() + dense_count_ * held_.size();
-  for (std::size_t c = 0; c < held_.size(); ++c) {
-    z[c] = root * held_[c];
-    cross_[c] -= share * held_[c];
-  }
+  auto z = dense_.col(dense_count_);
+  z = root * held_;
+  cross_ -= share * held_;
   for (std::size_t k = 0; k < rows.active().size(); ++k) {
-    const std::size_t c = rows.active()[k];
+    const auto c = static_cast<Index>(rows.active()[k]);
     z[c] -= root * rows.mean(k);
     cross_[c] += share * rows.mean(k);
   }
 }
 
-void joint_sum::sum_block(Eigen::MatrixXd* sum) {
+void joint_sum::sum_block(MatrixXd* sum) {
   rows.take_off_mean(decay_.data(), block_squares_, used_);
   const std::vector<std::size_t>& active = rows.active();
   const std::size_t count = active.size();
   std::fill_n(product_.begin(), count * count, 0.0);
-  add_outer_products(product_.data(), count, rows.row(0), used_, rows.stride(), 1.0);
+  best_products().add_outer_products(product_.data(), count, rows.row(0), used_, rows.stride(), 1.0);
   for (std::size_t c = 0; c < count; ++c) { /* on either side of the diagonal: to look which takes as long as to add */
     double* column = sum->col(static_cast<Eigen::Index>(active[c])).data();
     const double* product = product_.data() + c * count;
@@ -138,7 +128,7 @@ void joint_sum::sum_block(Eigen::MatrixXd* sum) {
   }
 }
 
-void joint_sum::end_block(Eigen::MatrixXd* sum) {
+void joint_sum::end_block(MatrixXd* sum) {
   if (used_ > 0) {
     sum_block(sum);
     pass_on();
@@ -147,39 +137,32 @@ void joint_sum::end_block(Eigen::MatrixXd* sum) {
       flush();
     }
   }
-  for (double& value : held_) {
-    value *= block_kept_;
-  }
+  held_ *= block_kept_;
   for (std::size_t k = 0; k < rows.active().size(); ++k) {
-    held_[rows.active()[k]] += rows.held(k);
+    held_[static_cast<Index>(rows.active()[k])] += rows.held(k);
   }
   kept_ *= block_kept_;
   rows.clear();
   used_ = 0;
   block_kept_ = 1.0;
   block_squares_ = 0.0;
-  rows.add(residual, 0.0);
+  rows.add(block_rows::sample, residual, 0.0);
 }
 
 void joint_sum::flush() {
-  add_outer_products(dense_sum_.data(), held_.size(), dense_.data(), dense_count_, held_.size(), 1.0);
+  const auto columns = static_cast<std::size_t>(held_.size());
+  best_products().add_outer_products(dense_sum_.data(), columns, dense_.data(), static_cast<std::size_t>(dense_count_),
+                                     columns, 1.0);
   dense_count_ = 0;
 }
 
-joint_segment joint_sum::end_segment(Eigen::MatrixXd* sum) {
+joint_segment joint_sum::end_segment(MatrixXd* sum) {
   flush();
-  const auto columns = static_cast<Eigen::Index>(held_.size());
-  for (Eigen::Index c = 0; c < columns; ++c) {
-    (*sum)(c, c) += dense_sum_[static_cast<std::size_t>(c * columns + c)];
-    for (Eigen::Index r = c + 1; r < columns; ++r) {
-      (*sum)(r, c) += (*sum)(c, r) + dense_sum_[static_cast<std::size_t>(c * columns + r)];
-      (*sum)(c, r) = 0.0;
-    }
-  }
-  const auto copy = [](const std::vector<double>& values) -> Eigen::VectorXd {
-    return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
-  };
-  return {copy(held_), copy(cross_), kept_, squares_};
+  auto all = sum->topLeftCorner(held_.size(), held_.size());
+  dense_sum_.triangularView<Eigen::Lower>() += all;
+  dense_sum_.triangularView<Eigen::StrictlyLower>() += all.transpose();
+  all = dense_sum_.triangularView<Eigen::Lower>();
+  return {held_, cross_, kept_, squares_};
 }
 
 }  // namespace tendonfmu::estimation

@@ -15,21 +15,14 @@ class block_rows {
  public:
   explicit block_rows(std::size_t columns);
 
-  /* to this sample's row */
-  void add(std::size_t column, double value) { row_[activate(column)] += value; }
+  /* to this sample's row, or to what the bias holds */
+  enum part { sample, bias };
+  void add(part to, std::size_t column, double value) { now_[to][activate(column)] += value; }
   /* `count` columns from `first` on, which are always given together */
-  void add_run(std::size_t first, std::size_t count, const double* values, double factor) {
-    double* row = row_.data() + activate_run(first, count);
+  void add_run(part to, std::size_t first, std::size_t count, const double* values, double factor) {
+    double* sum = now_[to].data() + activate_run(first, count);
     for (std::size_t k = 0; k < count; ++k) {
-      row[k] += factor * values[k];
-    }
-  }
-  /* the same to what the bias holds */
-  void jump(std::size_t column, double change) { held_[activate(column)] += change; }
-  void jump_run(std::size_t first, std::size_t count, const double* values, double factor) {
-    double* held = held_.data() + activate_run(first, count);
-    for (std::size_t k = 0; k < count; ++k) {
-      held[k] += factor * values[k];
+      sum[k] += factor * values[k];
     }
   }
 
@@ -44,8 +37,8 @@ class block_rows {
   const std::vector<std::size_t>& active() const { return active_; }
   const double* row(std::size_t at) const { return rows_.data() + at * stride_; }
   std::size_t stride() const { return stride_; }
-  double mean(std::size_t k) const { return mean_[k]; } /* of the k-th active column */
-  double held(std::size_t k) const { return held_[k]; }
+  double mean(std::size_t k) const { return mean_[static_cast<Eigen::Index>(k)]; } /* of the k-th active column */
+  double held(std::size_t k) const { return now_[bias][k]; }
 
  private:
   std::size_t activate(std::size_t column) {
@@ -71,7 +64,9 @@ class block_rows {
   std::size_t stride_, stored_ = 0; /* rows of the block */
   std::vector<std::int32_t> local_; /* place of a column among the active ones, −1 */
   std::vector<std::size_t> active_;
-  std::vector<double> rows_, row_, held_, mean_;
+  std::array<std::vector<double>, 2> now_; /* of sample and bias */
+  std::vector<double> rows_;
+  Eigen::VectorXd mean_;
 };
 
 /* What a segment of a recording adds up to for one joint, as if the bias held nothing at its start. */
@@ -101,15 +96,16 @@ class joint_sum {
   void flush();
 
   /* of the segment: what the bias holds at the block's start, Σ c_i ν_i, Π (1 − K), Σ c_i² */
-  std::vector<double> held_, cross_;
+  Eigen::VectorXd held_, cross_;
   double kept_ = 1.0, squares_ = 0.0;
   /* of the block */
   std::array<double, block_length> decay_{}; /* c_i */
   std::size_t used_ = 0;
   double block_kept_ = 1.0, block_squares_ = 0.0;
-  /* rows z of whole blocks, their sum, and the product of a block's rows */
-  std::vector<double> dense_, dense_sum_, product_;
-  std::size_t dense_count_ = 0;
+  /* rows z of whole blocks, a column each, their sum in the lower triangle, and the product of a block's rows */
+  Eigen::MatrixXd dense_, dense_sum_;
+  Eigen::Index dense_count_ = 0;
+  std::vector<double> product_;
 };
 
 }  // namespace tendonfmu::estimation

@@ -3,39 +3,52 @@
 #include <algorithm>
 #include <cmath>
 
-#include "symmetric_update.h"
+#include "products.h"
 
 namespace tendonfmu::estimation {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+Eigen::Map<const VectorXd> view(const double* values, Index count) {
+  return {values, count};
+}
+
+VectorXd copied(const std::vector<double>& values) {
+  return view(values.data(), static_cast<Index>(values.size()));
+}
+
+}  // namespace
 
 kalman_filter::kalman_filter(kalman_settings settings, const std::vector<double>& start, double prior_std)
-    : settings_(std::move(settings)), prior_std_(prior_std), start_(start) {
-  const std::size_t p = settings_.unknowns, n = settings_.joints, most = settings_.block * n;
-  bias_.assign(n, 0.0);
-  covariance_.assign(order() * order(), 0.0);
-  offset_.assign(p, 0.0);
-  for (std::size_t i = 0; i < p; ++i) {
-    start_[i] = std::clamp(start_[i], settings_.lower[i], settings_.upper[i]);
-  }
+    : settings_(std::move(settings)),
+      prior_std_(prior_std),
+      scale_(copied(settings_.scale)),
+      lower_(copied(settings_.lower)),
+      upper_(copied(settings_.upper)) {
+  const auto p = static_cast<Index>(settings_.unknowns), n = static_cast<Index>(settings_.joints);
+  const auto block = static_cast<Index>(settings_.block), most = (block + 1) * n;
+  start_ = copied(start).cwiseMax(lower_).cwiseMin(upper_);
   z_ = anchor_ = start_;
+  offset_.setZero(p);
+  bias_.setZero(n);
+  covariance_.setZero(p + n, p + n);
   set_prior();
-  jump_.assign(n, 0.0);
-  jump_rows_.assign(n * p, 0.0);
-  rows_.assign((most + n) * order(), 0.0);
+  jump_.setZero(n);
+  jump_rows_.setZero(n, p);
+  rows_.setZero(most, p + n);
   product_ = rows_;
-  inner_.assign((most + n) * (most + n), 0.0);
-  noise_.assign(settings_.block, 0.0);
-  time_ = noise_;
+  inner_.setZero(most, most);
+  noise_ = time_ = VectorXd::Zero(block);
   use_.assign(settings_.block, 0);
-  residual_.assign(most, 0.0);
-  pivot_ = white_ = innovation_ = innovation_variance_ = residual_;
-  correction_.assign(order(), 0.0);
+  residual_ = pivot_ = white_ = innovation_ = innovation_variance_ = VectorXd::Zero(block * n);
+  correction_.setZero(p + n);
 }
 
 void kalman_filter::set_prior() {
-  std::fill(covariance_.begin(), covariance_.end(), 0.0);
-  for (std::size_t i = 0; i < settings_.unknowns; ++i) {
-    at(i, i) = prior_std_ * prior_std_;
-  }
+  covariance_.setZero();
+  covariance_.diagonal().head(unknowns()).setConstant(prior_std_ * prior_std_);
 }
 
 void kalman_filter::begin_pass() {
@@ -45,83 +58,65 @@ void kalman_filter::begin_pass() {
   set_prior();
 }
 
-/* how far z is from where the samples are linearised */
 void kalman_filter::find_offset() {
-  for (std::size_t i = 0; settled_ && i < settings_.unknowns; ++i) {
-    offset_[i] = (z_[i] - anchor_[i]) / settings_.scale[i];
+  if (settled_) {
+    offset_ = (z_ - anchor_).cwiseQuotient(scale_);
   }
 }
 
-/* and what a row makes of it */
-double kalman_filter::offset(const double* row) const {
-  double sum = 0.0;
-  for (std::size_t i = 0; settled_ && i < settings_.unknowns; ++i) {
-    sum += row[i] * offset_[i];
-  }
-  return sum;
+/* of the state's order: by z/scale, and nothing by the bias */
+template <typename Slopes>
+void kalman_filter::set_row(Index row, const Slopes& slopes) {
+  rows_.row(row).head(unknowns()) = slopes.cwiseProduct(scale_);
+  rows_.row(row).tail(joints()).setZero();
 }
 
-/* row = (first + second)·scale; the bias columns are left alone */
-void kalman_filter::scale_row(const double* first, const double* second, double* row) const {
-  const double* scale = settings_.scale.data();
-  for (std::size_t i = 0; i < settings_.unknowns; ++i) {
-    row[i] = (second ? first[i] + second[i] : first[i]) * scale[i];
-  }
+/* H P and H P Hᵀ */
+void kalman_filter::multiply_rows(Index rows) {
+  const auto size = static_cast<std::size_t>(order()), count = static_cast<std::size_t>(rows),
+             stride = static_cast<std::size_t>(inner_.cols());
+  const products& by = best_products();
+  by.multiply_symmetric(product_.data(), size, covariance_.data(), size, rows_.data(), count, size);
+  by.multiply_transposed(inner_.data(), stride, rows_.data(), count, size, product_.data(), count, size, size);
 }
 
 void kalman_filter::start_bias(const double* bias, const double* rows, double variance) {
-  const std::size_t p = settings_.unknowns, n = settings_.joints;
-  for (std::size_t column = 0; column < order(); ++column) {
-    for (std::size_t row = std::max(column, p); row < order(); ++row) {
-      at(row, column) = 0.0;
-    }
-  }
+  const Index p = unknowns(), n = joints();
   find_offset();
-  for (std::size_t j = 0; j < n; ++j) {
-    scale_row(rows + j * p, nullptr, rows_.data() + j * order());
-    bias_[j] = bias[j] + offset(rows_.data() + j * order());
-    std::fill_n(rows_.begin() + static_cast<std::ptrdiff_t>(j * order() + p), n, 0.0);
+  for (Index j = 0; j < n; ++j) {
+    set_row(j, view(rows + j * p, p));
+    bias_[j] = bias[j] + offset(j);
   }
-  multiply_symmetric(product_.data(), order(), covariance_.data(), order(), rows_.data(), n, order());
-  multiply_transposed(inner_.data(), n, rows_.data(), n, order(), product_.data(), n, order(), order());
-  for (std::size_t j = 0; j < n; ++j) {
-    for (std::size_t i = 0; i < p; ++i) {
-      at(p + j, i) = product_[j * order() + i];
-    }
-    for (std::size_t other = 0; other <= j; ++other) {
-      at(p + j, p + other) = inner_[j * n + other] + (other == j ? variance : 0.0);
-    }
-  }
+  covariance_.bottomRows(n).setZero();
+  multiply_rows(n);
+  covariance_.bottomLeftCorner(n, p) = product_.topLeftCorner(n, p);
+  covariance_.bottomRightCorner(n, n) = inner_.topLeftCorner(n, n);
+  covariance_.diagonal().tail(n).array() += variance;
 }
 
 void kalman_filter::add(const kalman_sample& sample) {
-  const std::size_t p = settings_.unknowns, n = settings_.joints;
+  const Index p = unknowns(), n = joints();
   if (gathered_ == 0) {
     elapsed_ = 0.0;
     jumped_ = false;
-    std::fill(jump_.begin(), jump_.end(), 0.0);
+    jump_.setZero();
+    jump_rows_.setZero();
     find_offset();
   }
   elapsed_ += sample.step;
   if (sample.jump) {
-    for (std::size_t i = 0; i < n * p; ++i) {
-      jump_rows_[i] = (jumped_ ? jump_rows_[i] : 0.0) + sample.jump_rows[i];
-    }
-    for (std::size_t j = 0; j < n; ++j) {
-      jump_[j] += sample.jump[j];
-    }
+    jump_rows_ += Eigen::Map<const rows_matrix>(sample.jump_rows, n, p);
+    jump_ += view(sample.jump, n);
     jumped_ = true;
   }
-  for (std::size_t j = 0; j < n; ++j) {
-    const std::size_t row = gathered_ * n + j;
-    double* h = rows_.data() + row * order();
-    scale_row(sample.torque_rows + j * p, jumped_ ? jump_rows_.data() + j * p : nullptr, h);
-    std::fill_n(h + p, n, 0.0);
-    h[p + j] = 1.0;
-    residual_[row] = sample.measured[j] - sample.torque[j] - (bias_[j] + jump_[j]) - offset(h);
+  for (Index j = 0; j < n; ++j) {
+    const Index row = measured() + j;
+    set_row(row, view(sample.torque_rows + j * p, p) + jump_rows_.row(j).transpose());
+    rows_(row, p + j) = 1.0;
+    residual_[row] = sample.measured[j] - sample.torque[j] - (bias_[j] + jump_[j]) - offset(row);
   }
-  time_[gathered_] = elapsed_;
-  noise_[gathered_] = sample.noise;
+  time_[static_cast<Index>(gathered_)] = elapsed_;
+  noise_[static_cast<Index>(gathered_)] = sample.noise;
   use_[gathered_] = sample.use;
   ++gathered_;
 }
@@ -130,27 +125,23 @@ bool kalman_filter::update() {
   if (gathered_ == 0) {
     return true;
   }
-  const std::size_t p = settings_.unknowns, n = settings_.joints, measured = gathered_ * n;
+  const Index n = joints(), rows = measured() + (jumped_ ? n : 0);
   /* below the measurements: what the jumps of the whole block say about the bias at its end */
-  for (std::size_t j = 0; jumped_ && j < n; ++j) {
-    double* row = rows_.data() + (measured + j) * order();
-    scale_row(jump_rows_.data() + j * p, nullptr, row);
-    std::fill_n(row + p, n, 0.0);
+  for (Index row = measured(); row < rows; ++row) {
+    set_row(row, jump_rows_.row(row - measured()).transpose());
   }
-  for (std::size_t i = 0; settings_.parameter_drift > 0.0 && i < p; ++i) {
-    at(i, i) += settings_.parameter_drift * elapsed_;
-  }
-  const std::size_t rows = measured + (jumped_ ? n : 0);
-  multiply_symmetric(product_.data(), order(), covariance_.data(), order(), rows_.data(), rows, order());
-  multiply_transposed(inner_.data(), rows, rows_.data(), rows, order(), product_.data(), rows, order(), order());
+  covariance_.diagonal().head(unknowns()).array() += settings_.parameter_drift * elapsed_;
+  multiply_rows(rows);
   propagate(rows);
-  add_noise(rows);
-  if (!factor(rows)) {
+  add_noise();
+  if (!factor()) {
     return false;
   }
-  find_innovations(rows);
-  whiten(rows);
-  add_outer_products(covariance_.data(), order(), product_.data(), measured, order(), -1.0);
+  find_innovations();
+  whiten();
+  const auto size = static_cast<std::size_t>(order());
+  best_products().add_outer_products(covariance_.data(), size, product_.data(), static_cast<std::size_t>(measured()),
+                                     size, -1.0);
   correct();
   updated_ = gathered_;
   gathered_ = 0;
@@ -159,131 +150,89 @@ bool kalman_filter::update() {
 
 /* The bias goes to the end of the block, in mean and covariance, and so do the products: they become the covariances of
  * the measurements with the state there. */
-void kalman_filter::propagate(std::size_t rows) {
-  const std::size_t p = settings_.unknowns, n = settings_.joints, measured = gathered_ * n;
-  for (std::size_t j = 0; j < n; ++j) {
-    bias_[j] += jump_[j];
-    at(p + j, p + j) += settings_.drift_variance * elapsed_;
+void kalman_filter::propagate(Index rows) {
+  const Index p = unknowns(), n = joints(), m = measured();
+  bias_ += jump_;
+  covariance_.diagonal().tail(n).array() += settings_.drift_variance * elapsed_;
+  if (rows > m) {
+    for (Index j = 0; j < n; ++j) {
+      bias_[j] += offset(m + j);
+    }
+    const auto moved = product_.middleRows(m, n);
+    covariance_.bottomLeftCorner(n, p) += moved.leftCols(p);
+    covariance_.bottomRightCorner(n, n) +=
+        moved.rightCols(n) + moved.rightCols(n).transpose() + inner_.block(m, m, n, n);
+    product_.topRightCorner(m, n) += inner_.block(0, m, m, n);
   }
-  for (std::size_t j = 0; measured + j < rows; ++j) {
-    const double* moved = product_.data() + (measured + j) * order();
-    bias_[j] += offset(rows_.data() + (measured + j) * order());
-    for (std::size_t i = 0; i < p; ++i) {
-      at(p + j, i) += moved[i];
-    }
-    for (std::size_t other = 0; other <= j; ++other) {
-      const double* others = product_.data() + (measured + other) * order();
-      at(p + j, p + other) += moved[p + other] + others[p + j] + inner_[(measured + j) * rows + measured + other];
-    }
-    for (std::size_t row = 0; row < measured; ++row) {
-      product_[row * order() + p + j] += inner_[row * rows + measured + j];
-    }
-  }
-  for (std::size_t row = 0; row < measured; ++row) {
-    product_[row * order() + p + row % n] += settings_.drift_variance * time_[row / n];
+  for (Index row = 0; row < m; ++row) {
+    product_(row, p + row % n) += settings_.drift_variance * time_[row / n];
   }
 }
 
 /* the walk since the block's start, which later samples of a joint share, and the noise, to H P Hᵀ */
-void kalman_filter::add_noise(std::size_t rows) {
-  const std::size_t n = settings_.joints;
-  for (std::size_t row = 0; row < gathered_ * n; ++row) {
-    for (std::size_t before = row % n; before <= row; before += n) {
-      inner_[row * rows + before] += settings_.drift_variance * time_[before / n];
+void kalman_filter::add_noise() {
+  const Index n = joints();
+  for (Index row = 0; row < measured(); ++row) {
+    for (Index before = row % n; before <= row; before += n) {
+      inner_(row, before) += settings_.drift_variance * time_[before / n];
     }
-    inner_[row * rows + row] += noise_[row / n];
+    inner_(row, row) += noise_[row / n];
   }
 }
 
 /* Cholesky factor, row by row, in place of the innovations' covariance. A measurement that is not used has a row, which
  * has its own variance, but no column: no covariance with the others. */
-bool kalman_filter::factor(std::size_t rows) {
-  const std::size_t n = settings_.joints;
-  for (std::size_t row = 0; row < gathered_ * n; ++row) {
-    double* l = inner_.data() + row * rows;
-    for (std::size_t column = 0; column <= row; ++column) {
-      const double* other = inner_.data() + column * rows;
-      double rest = l[column];
-      for (std::size_t k = 0; k < column; ++k) {
-        rest -= l[k] * other[k];
-      }
-      if (column < row) {
-        l[column] = use_[column / n] ? rest / other[column] : 0.0;
-        continue;
-      }
-      if (!(rest > 0.0) || !(rest < HUGE_VAL)) {
-        return false;
-      }
-      pivot_[row] = rest;
-      l[row] = use_[row / n] ? std::sqrt(rest) : 0.0;
+bool kalman_filter::factor() {
+  for (Index row = 0; row < measured(); ++row) {
+    auto l = inner_.row(row);
+    for (Index column = 0; column < row; ++column) {
+      const double rest = l[column] - l.head(column).dot(inner_.row(column).head(column));
+      l[column] = used(column) ? rest / inner_(column, column) : 0.0;
     }
+    pivot_[row] = l[row] - l.head(row).squaredNorm();
+    if (!(pivot_[row] > 0.0) || !(pivot_[row] < HUGE_VAL)) {
+      return false;
+    }
+    l[row] = used(row) ? std::sqrt(pivot_[row]) : 0.0;
   }
   return true;
 }
 
 /* What each sample leaves with all before it taken in, and L⁻¹ times the residuals. */
-void kalman_filter::find_innovations(std::size_t rows) {
-  const std::size_t n = settings_.joints;
-  for (std::size_t row = 0; row < gathered_ * n; ++row) {
-    const double* l = inner_.data() + row * rows;
-    const std::size_t first = row - row % n; /* of its sample */
-    double residual = residual_[row], variance = pivot_[row];
-    for (std::size_t k = 0; k < first; ++k) {
-      residual -= l[k] * white_[k];
-    }
-    innovation_[row] = residual;
-    for (std::size_t k = first; k < row; ++k) {
-      residual -= l[k] * white_[k];
-      variance += l[k] * l[k];
-    }
-    innovation_variance_[row] = variance;
-    white_[row] = use_[row / n] ? residual / l[row] : 0.0;
+void kalman_filter::find_innovations() {
+  for (Index row = 0; row < measured(); ++row) {
+    const Index first = row - row % joints(), among = row - first; /* of its sample */
+    const auto l = inner_.row(row);
+    innovation_[row] = residual_[row] - l.head(first).dot(white_.head(first));
+    innovation_variance_[row] = pivot_[row] + l.segment(first, among).squaredNorm();
+    const double rest = innovation_[row] - l.segment(first, among).dot(white_.segment(first, among));
+    white_[row] = used(row) ? rest / l[row] : 0.0;
   }
 }
 
-/* W = L⁻¹ times the products, in their place: a sample at a time, what the samples before it predict is subtracted at
- * once
- */
-void kalman_filter::whiten(std::size_t rows) {
-  const std::size_t n = settings_.joints;
-  double* w = product_.data();
-  for (std::size_t first = 0; first < gathered_ * n; first += n) {
-    if (!use_[first / n]) {
-      std::fill_n(w + first * order(), n * order(), 0.0);
-      continue;
-    }
-    add_weighted_rows(w + first * order(), order(), n, inner_.data() + first * rows, rows, w, first, order(), order(),
-                      -1.0);
-    for (std::size_t row = first; row < first + n; ++row) {
-      const double* l = inner_.data() + row * rows;
-      double* own = w + row * order();
-      for (std::size_t k = first; k < row; ++k) {
-        const double* other = w + k * order();
-        for (std::size_t i = 0; i < order(); ++i) {
-          own[i] -= l[k] * other[i];
-        }
-      }
-      const double inverse = 1.0 / l[row];
-      for (std::size_t i = 0; i < order(); ++i) {
-        own[i] *= inverse;
-      }
+/* W = L⁻¹ times the products, in their place; of measurements that are not used nothing */
+void kalman_filter::whiten() {
+  for (Index row = 0; row < measured(); ++row) {
+    if (!used(row)) {
+      product_.row(row).setZero();
+      inner_.row(row).head(row).setZero();
+      inner_(row, row) = 1.0;
     }
   }
+  const auto size = static_cast<std::size_t>(order());
+  best_products().solve_lower(inner_.data(), static_cast<std::size_t>(inner_.cols()), product_.data(),
+                              static_cast<std::size_t>(measured()), size, size);
 }
 
 /* z and b += W·L⁻¹(y − ŷ), within the bounds */
 void kalman_filter::correct() {
-  const std::size_t p = settings_.unknowns, n = settings_.joints;
-  std::fill(correction_.begin(), correction_.end(), 0.0);
-  add_weighted_rows(correction_.data(), order(), 1, white_.data(), white_.size(), product_.data(), gathered_ * n,
-                    order(), order(), 1.0);
+  correction_.setZero();
+  for (Index row = 0; row < measured(); ++row) {
+    correction_ += white_[row] * product_.row(row).transpose();
+  }
   keep_within_bounds();
-  for (std::size_t i = 0; i < p; ++i) {
-    z_[i] = std::clamp(z_[i] + settings_.scale[i] * correction_[i], settings_.lower[i], settings_.upper[i]);
-  }
-  for (std::size_t j = 0; j < n; ++j) {
-    bias_[j] += correction_[p + j];
-  }
+  z_ = (z_ + scale_.cwiseProduct(correction_.head(unknowns()))).cwiseMax(lower_).cwiseMin(upper_);
+  bias_ += correction_.tail(joints());
 }
 
 /* Where a bound stops an unknown, the others go along as their covariances with it say: the most likely state on the
@@ -291,16 +240,14 @@ void kalman_filter::correct() {
 void kalman_filter::keep_within_bounds() {
   for (int sweep = 0; sweep < 3; ++sweep) {
     bool moved = false;
-    for (std::size_t i = 0; i < settings_.unknowns; ++i) {
-      const double wanted = z_[i] + settings_.scale[i] * correction_[i];
-      const double excess = std::clamp(wanted, settings_.lower[i], settings_.upper[i]) - wanted;
-      if (excess == 0.0) {
-        continue;
-      }
-      moved = true;
-      const double share = excess / settings_.scale[i] / at(i, i);
-      for (std::size_t k = 0; k < order(); ++k) {
-        correction_[k] += share * (k < i ? at(i, k) : at(k, i));
+    for (Index i = 0; i < unknowns(); ++i) {
+      const double wanted = z_[i] + scale_[i] * correction_[i];
+      const double excess = std::clamp(wanted, lower_[i], upper_[i]) - wanted;
+      if (excess != 0.0) {
+        moved = true;
+        const double share = excess / scale_[i] / covariance_(i, i);
+        correction_.head(i) += share * covariance_.row(i).head(i).transpose();
+        correction_.tail(order() - i) += share * covariance_.col(i).tail(order() - i);
       }
     }
     if (!moved) {
@@ -310,20 +257,14 @@ void kalman_filter::keep_within_bounds() {
 }
 
 double kalman_filter::covariance(std::size_t unknown, std::size_t other) const {
-  return at(std::max(unknown, other), std::min(unknown, other)) * (settings_.scale[unknown] * settings_.scale[other]);
-}
-
-double kalman_filter::bias_variance(std::size_t joint) const {
-  return at(settings_.unknowns + joint, settings_.unknowns + joint);
+  const auto row = static_cast<Index>(std::max(unknown, other)), column = static_cast<Index>(std::min(unknown, other));
+  return covariance_(row, column) * (scale_[row] * scale_[column]);
 }
 
 void kalman_filter::covariance(double* matrix) const {
-  const std::size_t p = settings_.unknowns;
-  for (std::size_t column = 0; column < p; ++column) {
-    for (std::size_t row = 0; row < p; ++row) {
-      matrix[row * p + column] = covariance(row, column);
-    }
-  }
+  Eigen::Map<Eigen::MatrixXd> all(matrix, unknowns(), unknowns());
+  all = covariance_.topLeftCorner(unknowns(), unknowns()).selfadjointView<Eigen::Lower>();
+  all = all.cwiseProduct(scale_.lazyProduct(scale_.transpose()));
 }
 
 }  // namespace tendonfmu::estimation

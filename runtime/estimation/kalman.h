@@ -10,7 +10,7 @@
  * from the Cholesky factor of the innovations' covariance: P − K H P loses nine digits in twenty samples here. */
 #pragma once
 
-#include <cstddef>
+#include <Eigen/Core>
 #include <vector>
 
 namespace tendonfmu::estimation {
@@ -69,52 +69,65 @@ class kalman_filter {
   const double* innovation() const { return innovation_.data(); }
   const double* innovation_variance() const { return innovation_variance_.data(); }
 
-  const double* z() const { return z_.data(); }                    /* [p] */
-  const double* bias() const { return bias_.data(); }              /* [n] N·m */
-  double bias_variance(std::size_t joint) const;                   /* (N·m)² */
+  const double* z() const { return z_.data(); }       /* [p] */
+  const double* bias() const { return bias_.data(); } /* [n] N·m */
+  double bias_variance(std::size_t joint) const {     /* (N·m)² */
+    return covariance_.diagonal()[unknowns() + static_cast<Eigen::Index>(joint)];
+  }
   double covariance(std::size_t unknown, std::size_t other) const; /* of z */
   void covariance(double* matrix) const;                           /* [p × p] of z, both triangles */
 
  private:
-  std::size_t order() const { return settings_.unknowns + settings_.joints; }
-  double& at(std::size_t row, std::size_t column) { return covariance_[column * order() + row]; } /* row >= column */
-  double at(std::size_t row, std::size_t column) const { return covariance_[column * order() + row]; }
+  using Index = Eigen::Index;
+
+  Index order() const { return covariance_.rows(); }
+  Index unknowns() const { return scale_.size(); }
+  Index joints() const { return bias_.size(); }
+  Index measured() const { return static_cast<Index>(gathered_) * joints(); }
+  bool used(Index row) const { return use_[static_cast<std::size_t>(row / joints())] != 0; }
   void set_prior();
   void find_offset();
-  double offset(const double* row) const;
-  void scale_row(const double* first, const double* second, double* row) const;
+  template <typename Slopes>
+  void set_row(Index row, const Slopes& slopes);
+  /* what a row makes of how far z is from where the samples are linearised */
+  double offset(Index row) const { return rows_.row(row).head(unknowns()).dot(offset_); }
+  void multiply_rows(Index rows);
   /* the steps of an update; rows: measurements, and joints more where the bias jumped */
-  void propagate(std::size_t rows);
-  void add_noise(std::size_t rows);
+  void propagate(Index rows);
+  void add_noise();
   /* Cholesky's factorisation, not Eigen's: it keeps every pivot, the variance of a measurement with all before it, and
    * leaves out the rows of samples that are not used. */
-  bool factor(std::size_t rows);
-  void find_innovations(std::size_t rows);
-  void whiten(std::size_t rows);
+  bool factor();
+  void find_innovations();
+  void whiten();
   void correct();
   void keep_within_bounds();
 
+  using rows_matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
   kalman_settings settings_;
   double prior_std_;
-  std::vector<double> z_, bias_, start_;
-  bool settled_ = false;                /* linearised at the anchor */
-  std::vector<double> anchor_, offset_; /* [p]; (z − anchor)/scale while a block is gathered */
-  std::vector<double> covariance_;      /* of (z/scale, b): lower triangle, as symmetric_update.h has it */
+  Eigen::VectorXd scale_, lower_, upper_; /* [p] */
+  Eigen::VectorXd z_, bias_, start_;
+  bool settled_ = false;            /* linearised at the anchor */
+  Eigen::VectorXd anchor_, offset_; /* [p]; (z − anchor)/scale while a block is gathered, 0 before a second pass */
+  Eigen::MatrixXd covariance_;      /* of (z/scale, b): lower triangle, as products.h has it */
   /* what is gathered; rows of the state's order, samples × joints of them and one more sample's for the jumps */
   std::size_t gathered_ = 0, updated_ = 0;
   bool jumped_ = false;
-  double elapsed_ = 0.0;                 /* s since the block's start */
-  std::vector<double> jump_, jump_rows_; /* [n], [n × p] sums since the block's start */
-  std::vector<double> rows_;             /* H */
-  std::vector<double> residual_, noise_, time_;
+  double elapsed_ = 0.0; /* s since the block's start */
+  Eigen::VectorXd jump_; /* [n], [n × p] sums since the block's start */
+  rows_matrix jump_rows_;
+  rows_matrix rows_; /* H */
+  Eigen::VectorXd residual_, noise_, time_;
   std::vector<unsigned char> use_;
   /* of the update */
-  std::vector<double> product_;    /* H P, then W */
-  std::vector<double> inner_;      /* H P Hᵀ, then its Cholesky factor: [rows × rows], lower triangle by rows */
-  std::vector<double> pivot_;      /* [rows] variance of each measurement with all before it */
-  std::vector<double> white_;      /* [rows] L⁻¹ (y − ŷ) */
-  std::vector<double> correction_; /* [order] */
-  std::vector<double> innovation_, innovation_variance_;
+  rows_matrix product_;        /* H P, then W */
+  rows_matrix inner_;          /* H P Hᵀ, then its Cholesky factor: lower triangle */
+  Eigen::VectorXd pivot_;      /* [rows] variance of each measurement with all before it */
+  Eigen::VectorXd white_;      /* [rows] L⁻¹ (y − ŷ) */
+  Eigen::VectorXd correction_; /* [order] */
+  Eigen::VectorXd innovation_, innovation_variance_;
 };
 
 }  // namespace tendonfmu::estimation

@@ -38,8 +38,7 @@ local_model::local_model(const fit_problem& problem, const scaled_box& box, cons
   for (std::size_t k = 0; k < rates.size(); ++k) {
     const Index rate = rates[k][0], drop = rates[k][1];
     const double at = drop < 0 ? problem.unknowns.fixed_drop(k) : x[drop] * box.scale[drop];
-    sides_.push_back({rate, drop, column(rate), drop < 0 ? -1 : column(drop),
-                      static_cast<Index>(problem.columns.expansion[k]), at, 0.0});
+    sides_.push_back({rate, drop, column(rate), static_cast<Index>(problem.columns.expansion[k]), at, 0.0});
   } /* −δ·v·E has the drop at x in its column, which sides with one rate share: each stands for its part of it */
   std::vector<double> sharing(static_cast<std::size_t>(x.size()), 0.0);
   for (const stribeck_side& side : sides_) {

@@ -2,11 +2,40 @@
  * the rates of the laws. */
 #pragma once
 
+#include <utility>
+
 #include "information.h"
-#include "prior.h"
 #include "scaled_box.h"
 
 namespace tendonfmu::estimation {
+
+/* What is known of the unknowns before the data: a Gaussian about the start of the description. In unknowns divided by
+ * their scales; d is how far they are from the start. */
+struct gaussian_prior {
+  /* weight: 1/prior_std²; known: information of an earlier fit [u × u], or empty. Not explicit: a weight is a prior. */
+  gaussian_prior(double weight, Eigen::MatrixXd known = {}) : weight(weight), known(std::move(known)) {}
+
+  double cost(const Eigen::VectorXd& d) const {
+    const double plain = 0.5 * weight * d.squaredNorm();
+    return known.size() > 0 ? plain + 0.5 * d.dot(known * d) : plain;
+  }
+  Eigen::VectorXd gradient(const Eigen::VectorXd& d) const {
+    Eigen::VectorXd found = weight * d;
+    if (known.size() > 0) {
+      found += known * d;
+    }
+    return found;
+  }
+  void add_to(Eigen::MatrixXd* information) const {
+    information->diagonal().array() += weight;
+    if (known.size() > 0) {
+      *information += known;
+    }
+  }
+
+  double weight;
+  Eigen::MatrixXd known;
+};
 
 /* In unknowns divided by their scales; the prior is in it. */
 class local_model {
@@ -25,10 +54,10 @@ class local_model {
  private:
   /* One side of a law with a rate to estimate, in the description's units. */
   struct stribeck_side {
-    Eigen::Index rate, drop;                              /* unknowns; drop −1: fixed */
-    Eigen::Index rate_column, drop_column, square_column; /* of the Gram matrix; the cubic one follows the square */
-    double at;                                            /* drop at x */
-    double per_drop;                                      /* 1/(at · sides that share the rate), 0 without a drop */
+    Eigen::Index rate, drop;                 /* unknowns; drop −1: fixed */
+    Eigen::Index rate_column, square_column; /* of the Gram matrix; the cubic one follows the square */
+    double at;                               /* drop at x */
+    double per_drop;                         /* 1/(at · sides that share the rate), 0 without a drop */
   };
 
   void linearise(const Eigen::VectorXd& step, Eigen::VectorXd* pull, Eigen::VectorXd* gradient,

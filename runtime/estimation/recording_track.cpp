@@ -2,8 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-
-#include "refusal.h"
+#include <stdexcept>
 
 namespace tendonfmu::estimation {
 
@@ -14,52 +13,52 @@ free_finger::free_finger(const void* image, std::size_t image_size) {
   char message[ERROR_BYTES] = "";
   finger_.reset(tendonfmu_create(image, image_size, message, sizeof message));
   if (!finger_) {
-    throw refused(message);
+    throw std::invalid_argument(message);
   }
+  changed_.reserve(finger_->shape.parameter_count);
+  values_.reserve(finger_->shape.parameter_count);
 }
 
+/* With thresholds that nothing reaches. bias.initial_torque is fixed, and no longer matters, after the first sample. */
 void free_finger::set(const std::vector<double>& numbers) {
-  free_ = numbers;
+  struct difference {
+    free_finger* self;
+    const std::vector<double>& numbers;
+  } context{this, numbers};
+  changed_.clear();
+  values_.clear();
   model_visit(
       &finger_->shape,
       [](void* context, const model_item* item) {
-        if (item->kind == ITEM_CONTACT_THRESHOLD || item->kind == ITEM_BAND_NOISE) {
-          const double highest = parameter_range_of(item, item->first).maximum;
-          std::fill_n(static_cast<double*>(context) + item->first, item->count, highest);
+        const auto& [self, numbers] = *static_cast<const difference*>(context);
+        const bool unreached = item->kind == ITEM_CONTACT_THRESHOLD || item->kind == ITEM_BAND_NOISE;
+        const bool fixed = item->kind == ITEM_INITIAL_TORQUE && tendonfmu_is_initialised(self->get());
+        for (std::uint32_t p = item->first; p < item->first + item->count && !fixed; ++p) {
+          const double value = unreached ? parameter_range_of(item, p).maximum : numbers[p];
+          if (value != self->get()->parameters[p]) {
+            self->changed_.push_back(p);
+            self->values_.push_back(value);
+          }
         }
         return 0;
       },
-      free_.data());
-  /* moment arms and bias.initial_torque are fixed after the first sample; that one no longer matters then */
-  if (tendonfmu_is_initialised(finger_.get())) {
-    std::vector<std::size_t> tunable;
-    std::vector<double> values;
-    for (std::uint32_t p = 0; p < free_.size(); ++p) {
-      const model_item item = parameter_item(&finger_->shape, p);
-      if (free_[p] != finger_->parameters[p] && item.kind != ITEM_INITIAL_TORQUE) {
-        tunable.push_back(p);
-        values.push_back(free_[p]);
-      }
-    }
-    if (tendonfmu_set_parameters(finger_.get(), tunable.size(), tunable.data(), values.data()) != TENDONFMU_OK) {
-      throw refused(tendonfmu_last_error(finger_.get()));
-    }
-  } else if (tendonfmu_set_parameters(finger_.get(), free_.size(), nullptr, free_.data()) != TENDONFMU_OK) {
-    throw refused(tendonfmu_last_error(finger_.get()));
+      &context);
+  if (tendonfmu_set_parameters(get(), changed_.size(), changed_.data(), values_.data()) != TENDONFMU_OK) {
+    throw std::invalid_argument(tendonfmu_last_error(get()));
   }
 }
 
 void free_finger::begin(const std::vector<double>& numbers, int kinematics_source) {
   tendonfmu_reset(finger_.get());
   if (tendonfmu_set_kinematics_source(finger_.get(), kinematics_source) != TENDONFMU_OK) {
-    throw refused(tendonfmu_last_error(finger_.get()));
+    throw std::invalid_argument(tendonfmu_last_error(finger_.get()));
   }
   set(numbers);
 }
 
 void free_finger::resume(const std::vector<unsigned char>& state, const std::vector<double>& numbers) {
   if (tendonfmu_restore_state(finger_.get(), state.data(), state.size()) != TENDONFMU_OK) {
-    throw refused(tendonfmu_last_error(finger_.get()));
+    throw std::invalid_argument(tendonfmu_last_error(finger_.get()));
   }
   set(numbers);
 }
@@ -69,7 +68,7 @@ void free_finger::step(std::size_t row, double time, const tendonfmu_inputs& inp
                                       ? tendonfmu_step(finger_.get(), time, &inputs)
                                       : tendonfmu_initialise(finger_.get(), time, &inputs);
   if (status != TENDONFMU_OK) {
-    throw refused("row " + std::to_string(row + 1) + ": " + tendonfmu_last_error(finger_.get()));
+    throw std::invalid_argument("row " + std::to_string(row + 1) + ": " + tendonfmu_last_error(finger_.get()));
   }
 }
 
@@ -97,14 +96,23 @@ std::vector<double> copied(const double* values, std::size_t count) {
 
 }  // namespace
 
+double torque_noise(const tendonfmu_finger* finger, const tendonfmu_inputs& inputs, double step) {
+  const finger_settings& s = finger->derived.settings;
+  double force = 0.0;
+  for (std::size_t i = 0; i < finger->tendons; ++i) {
+    force += std::fabs(inputs.tendon_force[i]) / static_cast<double>(finger->tendons);
+  }
+  const double noise = s.noise_std + s.noise_std_per_force * force;
+  return noise * noise * (s.noise_time >= 0.0 && step > 0.0 ? std::min(s.noise_time / step, 1e300) : 1.0);
+}
+
 recording_track::recording_track(free_finger* finger, const recording_arrays& a)
     : joints_(finger->get()->joints),
       tendons_(finger->get()->tendons),
       weight_root_(finger->get()->joints, 1.0),
       source_(a.kinematics_source) {
-  const finger_settings& settings = finger->get()->derived.settings;
   if (a.samples < 2) {
-    throw refused("samples = " + std::to_string(a.samples) + ": expected at least 2");
+    throw std::invalid_argument("samples = " + std::to_string(a.samples) + ": expected at least 2");
   }
   time_ = copied(a.time, a.samples);
   force_ = copied(a.inputs.tendon_force, a.samples * tendons_);
@@ -118,13 +126,11 @@ recording_track::recording_track(free_finger* finger, const recording_arrays& a)
   }
   for (std::size_t k = 0; k < external_.size(); ++k) {
     if (!std::isfinite(external_[k])) {
-      throw refused("row " + std::to_string(k / joints_ + 1) + ": external_torque[" + std::to_string(k % joints_ + 1) +
-                    "]: expected a finite number, N.m");
+      throw std::invalid_argument("row " + std::to_string(k / joints_ + 1) + ": external_torque[" +
+                                  std::to_string(k % joints_ + 1) + "]: expected a finite number, N.m");
     }
   }
   segment_length_ = std::max(shortest_segment, (a.samples + most_segments - 1) / most_segments);
-  noise_.resize(a.samples);
-  noise_scale_.assign(a.samples, 1.0);
   const std::vector<double> start(finger->get()->start, finger->get()->start + finger->get()->shape.parameter_count);
   finger->begin(start, source_);
   for (std::size_t k = 0; k < a.samples; ++k) {
@@ -133,36 +139,30 @@ recording_track::recording_track(free_finger* finger, const recording_arrays& a)
     }
     finger->step(k, time_[k], inputs(k));
     if (k > 0 && time_[k] == time_[k - 1]) {
-      throw refused("row " + std::to_string(k + 1) + ": time: expected later than the row before");
+      throw std::invalid_argument("row " + std::to_string(k + 1) + ": time: expected later than the row before");
     }
-    double force = 0.0;
-    for (std::size_t i = 0; i < tendons_; ++i) {
-      force += std::fabs(force_[k * tendons_ + i]) / static_cast<double>(tendons_);
+    plain_noise_.push_back(torque_noise(finger->get(), inputs(k), 0.0));
+    noise_.push_back(torque_noise(finger->get(), inputs(k), k > 0 ? time_[k] - time_[k - 1] : 0.0));
+    if (!(noise_[k] > 0.0)) {
+      throw std::invalid_argument(
+          "bias.noise_std = 0: expected above 0 N.m for a fit, which weighs the residuals by it");
     }
-    const double noise = settings.noise_std + settings.noise_std_per_force * force;
-    noise_[k] = noise * noise;
-    if (k > 0 && settings.noise_time >= 0.0) {
-      noise_scale_[k] = std::min(settings.noise_time / (time_[k] - time_[k - 1]), 1e300);
-    }
-    if (!(noise_[k] * noise_scale_[k] > 0.0)) {
-      throw refused("bias.noise_std = 0: expected above 0 N.m for a fit, which weighs the residuals by it");
-    }
-    mean_force_ += force / static_cast<double>(a.samples);
-    used_count_ += use_[k] != 0;
   }
-  if (used_count_ < 2) {
-    throw refused(std::to_string(used_count_) + " samples to learn from: expected at least 2");
+  const auto used = a.samples - static_cast<std::size_t>(std::count(use_.begin(), use_.end(), 0));
+  if (used < 2) {
+    throw std::invalid_argument(std::to_string(used) + " samples to learn from: expected at least 2");
   }
 }
 
-void recording_track::set_weights(const double* weight) {
+void recording_track::set_weights(const numbers& weight) {
+  expect_length(weight.size(), joints_, "weight", "numbers, one a joint");
   for (std::size_t j = 0; j < joints_; ++j) {
     if (!(weight[j] > 0.0 && weight[j] <= 1.0)) {
-      throw refused("weight[" + std::to_string(j + 1) + "] = " + std::to_string(weight[j]) +
-                    ": expected above 0 and at most 1");
+      throw std::invalid_argument("weight[" + std::to_string(j + 1) + "] = " + std::to_string(weight[j]) +
+                                  ": expected above 0 and at most 1");
     }
   }
-  std::transform(weight, weight + joints_, weight_root_.begin(), [](double share) { return std::sqrt(share); });
+  std::transform(weight.begin(), weight.end(), weight_root_.begin(), [](double share) { return std::sqrt(share); });
 }
 
 tendonfmu_inputs recording_track::inputs(std::size_t row) const {

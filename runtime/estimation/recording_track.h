@@ -2,61 +2,46 @@
  * what sticks since when) is found once, and remembered where a recording is cut into segments. */
 #pragma once
 
-#include <memory>
-
 #include "unknowns.h"
 
 namespace tendonfmu::estimation {
 
-struct finger_deleter {
-  void operator()(tendonfmu_finger* finger) const { tendonfmu_destroy(finger); }
-};
-using finger_pointer = std::unique_ptr<tendonfmu_finger, finger_deleter>;
-
 /* A finger of the core that never detects contact. */
 class free_finger {
  public:
-  /* throws refused */
+  /* throws std::invalid_argument */
   free_finger(const void* image, std::size_t image_size);
 
   tendonfmu_finger* get() const { return finger_.get(); }
 
-  /* Back to before the first sample, with these numbers of the description [parameter_count]. Throws refused. */
+  /* Back to before the first sample, with these numbers of the description [parameter_count]. What is refused throws.
+   */
   void begin(const std::vector<double>& numbers, int kinematics_source);
   /* A saved state, with these numbers instead of those saved with it. */
   void resume(const std::vector<unsigned char>& state, const std::vector<double>& numbers);
-  /* The next sample. Throws refused with the row. */
+  /* While it runs; allocates nothing. */
+  void set(const std::vector<double>& numbers);
+  /* The next sample. Throws with the row. */
   void step(std::size_t row, double time, const tendonfmu_inputs& inputs);
   std::vector<unsigned char> save() const;
 
  private:
-  void set(const std::vector<double>& numbers);
-
-  finger_pointer finger_;
-  std::vector<double> free_; /* numbers with thresholds that nothing reaches */
+  std::unique_ptr<tendonfmu_finger, void (*)(tendonfmu_finger*)> finger_{nullptr, tendonfmu_destroy};
+  std::vector<std::size_t> changed_; /* of a call of set(): parameters and their new values */
+  std::vector<double> values_;
 };
 
 /* Whether what a finger remembers depends on its numbers: those of extensions that act on signals or on friction, or of
  * friction with a memory. The states kept with a recording, which are those of the start, then hold for no others. */
 bool remembers_numbers(const tendonfmu_finger* finger);
 
-/* The finger's state at the beginning of each segment of a recording. */
-using segment_states = std::vector<std::vector<unsigned char>>;
-
-/* Arrays of the caller, row-major. */
-struct recording_arrays {
-  std::size_t samples;
-  const double* time;            /* [N] s */
-  tendonfmu_inputs inputs;       /* [N × m], [N × n] */
-  const double* external_torque; /* [N × n] N·m, or nullptr */
-  const unsigned char* use;      /* [N], or nullptr: all */
-  int kinematics_source;
-};
+/* Variance R of a sample's torques (step 6), (N·m)²; step: s since the sample before, 0: without bias.noise_time. */
+double torque_noise(const tendonfmu_finger* finger, const tendonfmu_inputs& inputs, double step);
 
 /* One recording, copied. */
 class recording_track {
  public:
-  /* Throws refused: a sample that the finger refuses, fewer than 2 used samples, noise of 0. */
+  /* Throws: a sample that the finger refuses, fewer than 2 used samples, noise of 0. */
   recording_track(free_finger* finger, const recording_arrays& arrays);
 
   std::size_t samples() const { return time_.size(); }
@@ -67,25 +52,23 @@ class recording_track {
   double external_torque(std::size_t row, std::size_t joint) const {
     return external_.empty() ? 0.0 : external_[row * joints_ + joint];
   }
-  /* variance R of the sample's torques, (N·m)²; plain: as at the first sample, without bias.noise_time */
-  double noise(std::size_t row) const { return noise_[row] * noise_scale_[row]; }
-  double plain_noise(std::size_t row) const { return noise_[row]; }
-  double mean_force() const { return mean_force_; } /* N */
-  /* [n] √ of the share of a sample that each sample counts for; 1 until set. Throws refused. */
+  /* torque_noise(); plain: as at the first sample */
+  double noise(std::size_t row) const { return noise_[row]; }
+  double plain_noise(std::size_t row) const { return plain_noise_[row]; }
+  /* [n] √ of the share of a sample that each sample counts for; 1 until set */
   double weight_root(std::size_t joint) const { return weight_root_[joint]; }
-  void set_weights(const double* weight);
+  void set_weights(const numbers& weight);
 
   /* Rows at which the finger's state is kept: 0, length, 2·length, … */
   std::size_t segment_length() const { return segment_length_; }
   std::size_t segments() const { return states_.size(); }
-  const segment_states& states() const { return states_; }
+  const std::vector<std::vector<unsigned char>>& states() const { return states_; }
 
  private:
-  std::vector<double> time_, force_, position_, angle_, velocity_, external_, noise_, noise_scale_;
+  std::vector<double> time_, force_, position_, angle_, velocity_, external_, noise_, plain_noise_;
   std::vector<unsigned char> use_;
-  segment_states states_;
-  std::size_t joints_, tendons_, used_count_ = 0, segment_length_ = 0;
-  double mean_force_ = 0.0;
+  std::vector<std::vector<unsigned char>> states_;
+  std::size_t joints_, tendons_, segment_length_;
   std::vector<double> weight_root_;
   int source_;
 };

@@ -39,11 +39,8 @@ scaled_box scaled_box::around(const VectorXd& x, double share) const {
 }
 
 std::vector<double> scaled_box::unknowns(const VectorXd& x) const {
-  std::vector<double> z(static_cast<std::size_t>(x.size()));
-  for (Index k = 0; k < x.size(); ++k) {
-    z[static_cast<std::size_t>(k)] = x[k] * scale[k];
-  }
-  return z;
+  const VectorXd z = x.cwiseProduct(scale);
+  return {z.data(), z.data() + z.size()};
 }
 
 namespace {

@@ -5,8 +5,7 @@
 #include <limits>
 #include <map>
 #include <numeric>
-
-#include "refusal.h"
+#include <stdexcept>
 
 namespace tendonfmu::estimation {
 namespace {
@@ -129,11 +128,11 @@ double value_of(unknown_role role, std::uint32_t parameter, const double* number
 /* Columns in the making. */
 class column_maker {
  public:
-  column_maker(const finger_structure& structure, const std::int32_t* group, const double* scale)
-      : s_(structure), group_(group), scale_(scale), column_(structure.finger->shape.parameter_count, -1) {
+  column_maker(const finger_structure& structure, std::vector<std::int32_t> group, const numbers& scale)
+      : s_(structure), group_(std::move(group)), scale_(scale), column_(structure.finger->shape.parameter_count, -1) {
     check_groups();
     for (const column_candidate& c : s_.candidates) {
-      if (group[c.parameter] >= 0 && !follows_coulomb(c)) {
+      if (group_[c.parameter] >= 0 && !follows_coulomb(c)) {
         add(c);
       }
     }
@@ -158,9 +157,9 @@ class column_maker {
     }
     for (std::uint32_t p = 0; p < column_.size(); ++p) {
       if (group_[p] >= 0 && !known[p]) {
-        throw refused(path_of(s_.finger, p) +
-                      ": not a number that can be estimated; expected one of a law, a cover, an "
-                      "extension or bias.initial_torque");
+        throw std::invalid_argument(path_of(s_.finger, p) +
+                                    ": not a number that can be estimated; expected one of a law, a cover, an "
+                                    "extension or bias.initial_torque");
       }
     }
   }
@@ -178,8 +177,8 @@ class column_maker {
     }
     unknown_item& unknown = list[place->second];
     if (unknown.role != c.role) {
-      throw refused(path_of(s_.finger, c.parameter) + ": shares its value with " + unknown.path +
-                    "; expected numbers of the same kind");
+      throw std::invalid_argument(path_of(s_.finger, c.parameter) + ": shares its value with " + unknown.path +
+                                  "; expected numbers of the same kind");
     }
     unknown.parameters.push_back(c.parameter);
     unknown.joint = std::min(unknown.joint, c.joint);
@@ -204,7 +203,9 @@ class column_maker {
     unknown->start = std::min(std::max(unknown->start, unknown->lower), unknown->upper);
   }
 
-  double given(std::uint32_t p) const { return scale_ && std::isfinite(scale_[p]) ? std::fabs(scale_[p]) : 0.0; }
+  double given(std::uint32_t p) const {
+    return !scale_.empty() && std::isfinite(scale_[p]) ? std::fabs(scale_[p]) : 0.0;
+  }
 
   double expected(unknown_role role, std::uint32_t p) const {
     if (given(p) > 0.0) {
@@ -234,7 +235,7 @@ class column_maker {
     if (kinds_[column] == ITEM_INITIAL_TORQUE) {
       return 1.0;
     }
-    throw refused(list[column].path + " = 0: its size is unknown; expected a scale, or a start above 0");
+    throw std::invalid_argument(list[column].path + " = 0: its size is unknown; expected a scale, or a start above 0");
   }
 
   void bound(unknown_item* unknown) const {
@@ -295,8 +296,8 @@ class column_maker {
   }
 
   const finger_structure& s_;
-  const std::int32_t* group_;
-  const double* scale_;
+  const std::vector<std::int32_t> group_;
+  const numbers& scale_;
   std::vector<std::int32_t> column_;
   std::map<std::int32_t, std::size_t> by_group_;
   std::vector<model_item_kind> kinds_;
@@ -304,13 +305,20 @@ class column_maker {
 
 }  // namespace
 
-unknown_list::unknown_list(const tendonfmu_finger* finger, const std::int32_t* group, const double* scale) {
+void expect_length(std::size_t length, std::size_t expected, const char* name, const char* what) {
+  if (length != expected) {
+    throw std::invalid_argument(std::string(name) + ": expected " + std::to_string(expected) + " " + what);
+  }
+}
+
+unknown_list::unknown_list(const tendonfmu_finger* finger, const std::vector<std::int32_t>& group,
+                           const numbers& scale) {
   const std::size_t count = finger->shape.parameter_count;
+  expect_length(group.empty() ? count : group.size(), count, "group", "numbers");
+  expect_length(scale.empty() ? count : scale.size(), count, "scale", "numbers");
   finger_structure structure{finger, {}, {}, {}, -1};
   model_visit(&finger->shape, add_item, &structure);
-  const std::vector<std::int32_t> present =
-      group ? std::vector<std::int32_t>(group, group + count) : present_groups(structure);
-  column_maker columns(structure, present.data(), scale);
+  column_maker columns(structure, group.empty() ? present_groups(structure) : group, scale);
   list_ = std::move(columns.list);
   start_.assign(finger->start, finger->start + count);
   sides_.assign(count, {{-1, -1, -1, -1}, false, 0, 0, -1});

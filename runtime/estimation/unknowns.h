@@ -1,32 +1,15 @@
-/* What is estimated: unknowns, each one column, made of the numbers of the description.
- *
- * A side of a law becomes coulomb Fc, drop Fs − Fc, rate 1/vs and viscous Fv: every bound is then a box (Fs >= Fc >= 0,
- * vs > vs_min), and 1/vs has no singularity (paper VII). Covers, extensions and the initial bias are taken as they are.
- */
+/* What is estimated: unknowns, each one column, made of the numbers of the description. */
 #pragma once
 
 #include <array>
-#include <cstdint>
-#include <string>
-#include <vector>
 
 #include "core_inside.h"
+#include "tendonfmu_estimation.hpp"
 
 namespace tendonfmu::estimation {
 
-enum class unknown_role { coulomb, drop, rate, viscous, value };
-
-/* One unknown. */
-struct unknown_item {
-  unknown_role role;
-  std::vector<std::uint32_t>
-      parameters; /* that it moves: of a drop the statics; of a tied coulomb its static follows */
-  double start, lower, upper;
-  double scale;        /* expected magnitude: of the prior, and what makes the columns comparable */
-  std::size_t joint;   /* the first that it turns, 0-based: it turns none before */
-  std::string path;    /* of its first parameter */
-  bool curved = false; /* the model is far from linear in it */
-};
+/* Throws std::invalid_argument: "<name>: expected <expected> <what>". */
+void expect_length(std::size_t length, std::size_t expected, const char* name, const char* what);
 
 /* Columns of one side of a law: −1 where a number is fixed. */
 struct side_columns {
@@ -38,12 +21,11 @@ struct side_columns {
 
 class unknown_list {
  public:
-  /* group [parameter_count]: −1 fixed, equal numbers share one value; nullptr: all that the structure has.
-   * scale [parameter_count]: expected magnitudes in the description's numbers, NaN or nullptr: from the start. Throws
-   * refused with one line. */
-  unknown_list(const tendonfmu_finger* finger, const std::int32_t* group, const double* scale);
+  /* group, scale: as for an estimator. Throws std::invalid_argument. */
+  unknown_list(const tendonfmu_finger* finger, const std::vector<std::int32_t>& group, const numbers& scale);
 
   std::size_t count() const { return list_.size(); }
+  const std::vector<unknown_item>& items() const { return list_; }
   /* of the sides with a rate to estimate: columns of rate and drop (−1) */
   const std::vector<std::array<std::int32_t, 2>>& rates() const { return rates_; }
   /* static − coulomb of the k-th of them where it is fixed */

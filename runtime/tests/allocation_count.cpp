@@ -46,7 +46,7 @@ void* aligned_alloc(size_t alignment, size_t size) {
   return __libc_memalign(alignment, size);
 }
 void free(void* block) {
-  ++allocations;
+  allocations += block != nullptr;
   __libc_free(block);
 }
 }

@@ -16,7 +16,7 @@
 #define COUNTS_ALLOCATIONS 1
 // Functions, not a variable: the compiler takes malloc to change no variable of the program.
 void count_allocations_anew();
-// calls of malloc, calloc, realloc, aligned_alloc and free since then
+// calls of malloc, calloc, realloc, aligned_alloc and free (of a block) since then
 long counted_allocations();
 // whether one of malloc and one of free are counted
 bool allocations_count();

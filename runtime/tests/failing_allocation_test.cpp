@@ -1,10 +1,8 @@
-// The C interfaces of the estimation without memory: no exception leaves them, and what failed can be done again.
+// The estimation without memory: nothing is left behind, and what failed can be done again.
 #include <cstdlib>
 #include <new>
-#include <string_view>
 
 #include "made_recording.h"
-#include "tendonfmu_learner.h"
 
 namespace {
 
@@ -36,60 +34,33 @@ namespace {
 
 /* Calls with memory for 0, 1, 2 ... allocations until the call succeeds; how often it failed. */
 template <typename Call>
-long failures(const Call& succeeds) {
+long failures(const Call& call) {
   for (long enough = 0; enough < 100000; ++enough) {
     left = enough;
-    const bool done = succeeds();
-    left = -1;
-    if (done) {
+    try {
+      call();
+      left = -1;
       return enough;
+    } catch (const std::bad_alloc&) {
+      left = -1;
     }
   }
   return -1;
 }
 
-struct FailingAllocation : testing::Test {
-  std::vector<unsigned char> image = made::image_of(made::learnable_finger());
-  char message[200] = "";
-};
-
-TEST_F(FailingAllocation, MakesNothingAndSaysWhy) {
-  const auto create = [&](auto call, auto* made, auto... options) {
-    bool said = true;
-    const long failed = failures([&] {
-      *made = call(image.data(), image.size(), nullptr, nullptr, options..., message, sizeof message);
-      said = said && (*made || std::string_view(message) == "out of memory");
-      return *made != nullptr;
-    });
-    EXPECT_GT(failed, 5);
-    EXPECT_TRUE(said) << message;
-  };
-  tendonfmu_estimator* estimator = nullptr;
-  create(tendonfmu_estimator_create, &estimator);
-  tendonfmu_estimator_destroy(estimator);
-  tendonfmu_learner* learner = nullptr;
-  create(tendonfmu_learner_create, &learner, static_cast<const tendonfmu_learner_options*>(nullptr));
-  tendonfmu_learner_destroy(learner);
+TEST(FailingAllocation, ThrowsUntilThereIsEnough) {
+  const std::vector<unsigned char> image = made::image_of(made::learnable_finger());
+  EXPECT_GT(failures([&] { made::estimator(image.data(), image.size()); }), 5);
+  EXPECT_GT(failures([&] { tendonfmu::estimation::make_learner(image.data(), image.size()); }), 5);
 }
 
-TEST_F(FailingAllocation, LeavesAnEstimatorThatTakesTheSameRecordingLater) {
+TEST(FailingAllocation, LeavesAnEstimatorThatTakesTheSameRecordingLater) {
   const made::Recording recording = made::made(made::learnable_finger(), 50, 0.002, 1);
-  tendonfmu_estimator* estimator =
-      tendonfmu_estimator_create(image.data(), image.size(), nullptr, nullptr, message, sizeof message);
-  ASSERT_TRUE(estimator) << message;
-  const tendonfmu_inputs inputs = recording.inputs();
-  const long failed = failures([&] {
-    return tendonfmu_estimator_add_recording(estimator, recording.time.size(), recording.time.data(), &inputs, 3,
-                                             nullptr, nullptr, nullptr) == TENDONFMU_OK;
-  });
-  EXPECT_GT(failed, 2);
-  left = 0;
-  tendonfmu_unknown unknown;
-  const tendonfmu_status refused = tendonfmu_estimator_get_unknown(estimator, 1 << 20, &unknown);
-  left = -1;
-  EXPECT_NE(refused, TENDONFMU_OK);
-  EXPECT_EQ(tendonfmu_estimator_get_unknown(estimator, 0, &unknown), TENDONFMU_OK);
-  tendonfmu_estimator_destroy(estimator);
+  made::estimator e = made::estimator_of(made::learnable_finger()),
+                  untouched = made::estimator_of(made::learnable_finger());
+  EXPECT_GT(failures([&] { e.add_recording(recording.arrays()); }), 2);
+  untouched.add_recording(recording.arrays());
+  EXPECT_EQ(e.evaluate(e.start()).gradient, untouched.evaluate(e.start()).gradient);
 }
 
 }  // namespace

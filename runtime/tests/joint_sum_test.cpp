@@ -12,6 +12,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using tendonfmu::estimation::block_length;
+using tendonfmu::estimation::block_rows;
 using tendonfmu::estimation::joint_segment;
 using tendonfmu::estimation::joint_sum;
 
@@ -78,15 +79,15 @@ void give(const Sample& s, joint_sum* joint) {
   for (Index c = 0; c < s.row.size(); ++c) {
     const bool of_run = c >= static_cast<Index>(run_first) && c < static_cast<Index>(run_first + run_length);
     if (!of_run && s.row[c] != 0.0) {
-      joint->rows.add(static_cast<std::size_t>(c), s.row[c]);
+      joint->rows.add(block_rows::sample, static_cast<std::size_t>(c), s.row[c]);
     }
     if (!of_run && s.jump[c] != 0.0) {
-      joint->rows.jump(static_cast<std::size_t>(c), s.jump[c]);
+      joint->rows.add(block_rows::bias, static_cast<std::size_t>(c), s.jump[c]);
     }
   }
   if (s.run) {
-    joint->rows.add_run(run_first, run_length, row, 1.0);
-    joint->rows.jump_run(run_first, run_length, jump, 1.0);
+    joint->rows.add_run(block_rows::sample, run_first, run_length, row, 1.0);
+    joint->rows.add_run(block_rows::bias, run_first, run_length, jump, 1.0);
   }
   if (s.gain > 0.0 || s.weight > 0.0) {
     joint->filter(s.gain, s.weight);

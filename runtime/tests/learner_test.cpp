@@ -1,4 +1,4 @@
-// tendonfmu_learner.h on recordings whose truth is known.
+// The learner of tendonfmu_estimation.hpp on recordings whose truth is known.
 #include <limits>
 
 #include "allocation_count.h"
@@ -10,6 +10,7 @@ using made::Json;
 using made::Learner;
 using made::Numbers;
 using made::Recording;
+using made::refusal;
 
 /* A finger, another that takes its numbers to be a fifth larger or smaller, and what the first one does. */
 struct Case {
@@ -69,7 +70,7 @@ TEST(Learner, FindsTheTruthWithinItsErrors) {
     const Numbers truth = made::truth_of(c.truth), error = errors_at_truth(c), z = learner.z();
     for (std::size_t i = 0; i < z.size(); ++i) {
       if (error[i] < 0.3 * truth[i]) {
-        EXPECT_LT(std::fabs(z[i] - truth[i]), 4.0 * error[i]) << seed << " " << learner.unknown(i).path;
+        EXPECT_LT(std::fabs(z[i] - truth[i]), 4.0 * error[i]) << seed << " " << learner->unknowns()[i].path;
         squares += std::pow((z[i] - truth[i]) / error[i], 2);
         ++identified;
       }
@@ -83,25 +84,20 @@ TEST(Learner, TakesSamplesOneByOneAsTheRunDoes) {
   const Case c(7, 503);
   Learner whole(c.description), steps(c.description);
   whole.run(c.recording);
-  tendonfmu_learner* l = steps.get();
   Numbers innovation(c.recording.samples * 2, std::nan("")), last(16), last_variance(16);
   for (std::size_t k = 0; k < c.recording.samples; ++k) {
-    const tendonfmu_inputs inputs = c.recording.inputs(k);
-    const tendonfmu_status status =
-        k == 0 ? tendonfmu_learner_initialise(l, c.recording.time[0], &inputs, 3, c.recording.load(0), 1)
-               : tendonfmu_learner_step(l, c.recording.time[k], &inputs, c.recording.load(k), 1);
-    ASSERT_EQ(status, TENDONFMU_OK) << tendonfmu_learner_last_error(l);
-    if (k > 0) { /* the same time again: nothing */
-      ASSERT_EQ(tendonfmu_learner_step(l, c.recording.time[k], &inputs, nullptr, 1), TENDONFMU_OK);
+    if (k == 0) {
+      steps->initialise(c.recording.sample(0), 3);
+      continue;
     }
-    std::size_t count = 0;
-    if (k > 0 && k % 8 == 0) {
-      ASSERT_EQ(tendonfmu_learner_get_innovations(l, &count, last.data(), last_variance.data()), TENDONFMU_OK);
-      ASSERT_EQ(count, 8u);
+    ASSERT_EQ(steps->step(c.recording.sample(k)), k % 8 == 0) << k;
+    ASSERT_FALSE(steps->step(c.recording.sample(k))); /* the same time again: nothing */
+    if (k % 8 == 0) {
+      ASSERT_EQ(steps->get_innovations(last.data(), last_variance.data()), 8u);
       std::copy(last.begin(), last.end(), innovation.begin() + static_cast<std::ptrdiff_t>(2 * (k - 7)));
     }
   }
-  ASSERT_EQ(tendonfmu_learner_finish(l), TENDONFMU_OK);
+  steps->finish();
   EXPECT_EQ(steps.z(), whole.z());
   EXPECT_EQ(steps.covariance(), whole.covariance());
   EXPECT_EQ(steps.bias(), whole.bias());
@@ -135,36 +131,31 @@ TEST(Learner, ARefusedSampleChangesNothing) {
   const Case c(13, 400);
   Learner clean(c.description), teased(c.description);
   clean.run(c.recording);
-  tendonfmu_learner* l = teased.get();
-  const double nothing = std::nan(""), load[] = {0.0, std::numeric_limits<double>::infinity()};
-  const Numbers no_force(2, nothing);
-  tendonfmu_inputs inputs = c.recording.inputs(0);
-  EXPECT_EQ(tendonfmu_learner_step(l, 0.0, &inputs, nullptr, 1), TENDONFMU_WRONG_ORDER);
-  EXPECT_EQ(tendonfmu_learner_get_bias(l, nullptr, nullptr), TENDONFMU_WRONG_ORDER);
-  ASSERT_EQ(tendonfmu_learner_initialise(l, c.recording.time[0], &inputs, 3, c.recording.load(0), 1), TENDONFMU_OK);
+  const Numbers no_force(2, std::nan("")), load = {0.0, std::numeric_limits<double>::infinity()};
+  EXPECT_EQ(refusal([&] { teased->step(c.recording.sample(0)); }),
+            "a step before the first sample: expected initialise first");
+  EXPECT_EQ(refusal([&] { teased->get_bias(nullptr, nullptr); }), "no bias before the first sample that is used");
+  teased->initialise(c.recording.sample(0), 3);
   for (std::size_t k = 1; k < c.recording.samples; ++k) {
-    inputs = c.recording.inputs(k);
-    tendonfmu_inputs bad = inputs;
-    bad.tendon_force = no_force.data();
-    const double time = c.recording.time[k];
-    ASSERT_EQ(tendonfmu_learner_step(l, time, &bad, nullptr, 1), TENDONFMU_BAD_SAMPLE);
-    ASSERT_EQ(tendonfmu_learner_step(l, time, &inputs, load, 1), TENDONFMU_BAD_SAMPLE);
-    ASSERT_EQ(tendonfmu_learner_step(l, time - 1.0, &inputs, nullptr, 1), TENDONFMU_BAD_SAMPLE);
-    ASSERT_EQ(tendonfmu_learner_step(l, time, &inputs, c.recording.load(k), 1), TENDONFMU_OK);
+    tendonfmu::estimation::learner_sample bad[3] = {c.recording.sample(k), c.recording.sample(k),
+                                                    c.recording.sample(k)};
+    bad[0].inputs.tendon_force = no_force.data();
+    bad[1].external_torque = load.data();
+    bad[2].time -= 1.0;
+    for (const auto& sample : bad) {
+      ASSERT_NE(refusal([&] { teased->step(sample); }), "");
+    }
+    teased->step(c.recording.sample(k));
   }
-  ASSERT_EQ(tendonfmu_learner_finish(l), TENDONFMU_OK);
+  teased->finish();
   EXPECT_EQ(clean.z(), teased.z());
   EXPECT_EQ(clean.covariance(), teased.covariance());
 }
 
 TEST(Learner, SaysWhyItRefuses) {
-  const auto reason = [](const Json& description, tendonfmu_learner_options options) {
+  const auto reason = [](const Json& description, const tendonfmu::estimation::learner_options& options) {
     const std::vector<unsigned char> image = made::image_of(description);
-    char message[400] = "";
-    tendonfmu_learner* l =
-        tendonfmu_learner_create(image.data(), image.size(), nullptr, nullptr, &options, message, sizeof message);
-    EXPECT_EQ(l, nullptr);
-    return std::string(message);
+    return refusal([&] { tendonfmu::estimation::make_learner(image.data(), image.size(), options); });
   };
   const Json good = made::learnable_finger();
   EXPECT_EQ(reason(good, {0.0, 8, 0.0}), "prior_std = 0.000000: expected above 0, at most 1e6 scales");
@@ -173,52 +164,23 @@ TEST(Learner, SaysWhyItRefuses) {
   EXPECT_EQ(reason(good, {1.0, 8, -1.0}), "parameter_drift = -1.000000: expected 0 to 1e6 1/s");
   Json silent = good;
   silent["bias"]["noise_std"] = 0.0;
-  EXPECT_EQ(reason(silent, {1.0, 8, 0.0}),
-            "bias.noise_std = 0: expected above 0 N.m to learn, which weighs the residuals by it");
+  EXPECT_EQ(reason(silent, {}), "bias.noise_std = 0: expected above 0 N.m to learn, which weighs the residuals by it");
 
   Case c(14, 5);
   Learner learner(good);
   c.recording.time[3] = c.recording.time[2];
-  const tendonfmu_inputs inputs = c.recording.inputs();
-  std::size_t done = 7;
-  EXPECT_EQ(tendonfmu_learner_run(learner.get(), 5, c.recording.time.data(), &inputs, 3, nullptr, nullptr, nullptr,
-                                  nullptr, nullptr, nullptr, &done),
-            TENDONFMU_BAD_SAMPLE);
-  EXPECT_EQ(done, 3u);
-  EXPECT_STREQ(tendonfmu_learner_last_error(learner.get()), "row 4: time: expected later than the row before");
-  EXPECT_EQ(tendonfmu_learner_run(learner.get(), 1, c.recording.time.data(), &inputs, 3, nullptr, nullptr, nullptr,
-                                  nullptr, nullptr, nullptr, &done),
-            TENDONFMU_BAD_SAMPLE);
-  EXPECT_STREQ(tendonfmu_learner_last_error(learner.get()), "samples = 1: expected at least 2");
-  EXPECT_EQ(tendonfmu_learner_initialise(learner.get(), 0.0, &inputs, 4, nullptr, 1), TENDONFMU_BAD_ARGUMENT);
+  EXPECT_EQ(refusal([&] { learner->run(c.recording.arrays()); }), "row 4: time: expected later than the row before");
+  c.recording.samples = 1;
+  EXPECT_EQ(refusal([&] { learner->run(c.recording.arrays()); }), "samples = 1: expected at least 2");
+  EXPECT_EQ(refusal([&] { learner->initialise(c.recording.sample(0), 4); }).find("kinematics_source: expected 1"), 0u);
 }
 
 TEST(Learner, StopsWhenTheWatchSaysSo) {
   const Case c(15, 3000);
   Learner learner(c.description);
-  const tendonfmu_inputs inputs = c.recording.inputs();
-  std::size_t done = 0;
-  const auto watch = [](void*, std::size_t row, std::size_t) { return row < 1000 ? 1 : 0; };
-  EXPECT_EQ(tendonfmu_learner_run(learner.get(), 3000, c.recording.time.data(), &inputs, 3, c.recording.load(), nullptr,
-                                  nullptr, nullptr, watch, nullptr, &done),
-            TENDONFMU_OK);
-  EXPECT_EQ(done, 1001u);
-}
-
-TEST(Learner, TakesNoLearner) {
-  tendonfmu_learner_destroy(nullptr);
-  EXPECT_EQ(tendonfmu_learner_unknown_count(nullptr) + tendonfmu_learner_slack_samples(nullptr), 0u);
-  EXPECT_STREQ(tendonfmu_learner_last_error(nullptr), "no learner: NULL");
-  EXPECT_EQ(tendonfmu_learner_create(nullptr, 0, nullptr, nullptr, nullptr, nullptr, 0), nullptr);
-  for (const tendonfmu_status status :
-       {tendonfmu_learner_initialise(nullptr, 0.0, nullptr, 1, nullptr, 1),
-        tendonfmu_learner_step(nullptr, 0.0, nullptr, nullptr, 1), tendonfmu_learner_finish(nullptr),
-        tendonfmu_learner_get_values(nullptr, nullptr, nullptr),
-        tendonfmu_learner_get_unknowns(nullptr, nullptr, nullptr),
-        tendonfmu_learner_get_bias(nullptr, nullptr, nullptr),
-        tendonfmu_learner_get_innovations(nullptr, nullptr, nullptr, nullptr)}) {
-    EXPECT_EQ(status, TENDONFMU_BAD_ARGUMENT);
-  }
+  EXPECT_EQ(
+      learner->run(c.recording.arrays(), nullptr, nullptr, [](std::size_t row, std::size_t) { return row < 1000; }),
+      1001u);
 }
 
 TEST(Learner, StepAllocatesNothing) {
@@ -226,20 +188,15 @@ TEST(Learner, StepAllocatesNothing) {
   ASSERT_TRUE(allocations_count());
   const Case c(16, 2000);
   Learner learner(c.description);
-  tendonfmu_learner* l = learner.get();
-  Numbers values(tendonfmu_learner_parameter_count(l)), errors = values, bias(2);
-  for (std::size_t k = 0; k < c.recording.samples; ++k) {
-    const tendonfmu_inputs inputs = c.recording.inputs(k);
-    if (k == 0) {
-      tendonfmu_learner_initialise(l, c.recording.time[0], &inputs, 3, c.recording.load(0), 1);
-      count_allocations_anew();
-      continue;
-    }
-    tendonfmu_learner_step(l, c.recording.time[k], &inputs, c.recording.load(k), 1);
+  Numbers values(learner->parameter_count()), errors = values, bias(2);
+  learner->initialise(c.recording.sample(0), 3);
+  count_allocations_anew();
+  for (std::size_t k = 1; k < c.recording.samples; ++k) {
+    learner->step(c.recording.sample(k));
     if (k % 100 == 0) {
-      tendonfmu_learner_finish(l);
-      tendonfmu_learner_get_values(l, values.data(), errors.data());
-      tendonfmu_learner_get_bias(l, bias.data(), nullptr);
+      learner->finish();
+      learner->get_values(values.data(), errors.data());
+      learner->get_bias(bias.data(), nullptr);
     }
   }
   const long counted = counted_allocations();

@@ -34,7 +34,7 @@ class Case {
   explicit Case(double prior = 0.0)
       : truth_(made::learnable_finger()),
         image_(made::image_of(guess())),
-        problem_(image_.data(), image_.size(), nullptr, nullptr),
+        problem_(image_.data(), image_.size(), {}, {}),
         box_(problem_.unknowns),
         prior_(prior) {
     made::Recording r = made::made(truth_, 2500, 0.004, 7);
@@ -127,7 +127,7 @@ struct Parabola {
 scaled_box empty_box() {
   static const std::vector<unsigned char> image = made::image_of(made::learnable_finger());
   const tendonfmu::estimation::free_finger finger(image.data(), image.size());
-  return scaled_box(tendonfmu::estimation::unknown_list(finger.get(), nullptr, nullptr));
+  return scaled_box(tendonfmu::estimation::unknown_list(finger.get(), {}, {}));
 }
 
 Parabola random_parabola(Index p, std::mt19937_64* random) {

@@ -4,18 +4,20 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <functional>
 #include <random>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "described_finger.h"
-#include "tendonfmu_estimation.h"
+#include "tendonfmu_estimation.hpp"
 
 namespace made {
 
 using Json = nlohmann::json;
 using Numbers = std::vector<double>;
+using tendonfmu::estimation::estimator;
+using tendonfmu::estimation::recording_arrays;
 
 inline std::vector<unsigned char> image_of(const Json& description) {
   const Reading reading = read(description);
@@ -64,6 +66,12 @@ struct Recording {
     return {force.data() + row * tendons, nullptr, angle.data() + row * joints, velocity.data() + row * joints};
   }
   const double* load(std::size_t row = 0) const { return external.data() + row * joints; }
+  recording_arrays arrays() const {
+    return {samples, time.data(), inputs(), load(), use.data(), TENDONFMU_JOINT_VELOCITIES};
+  }
+  tendonfmu::estimation::learner_sample sample(std::size_t row) const {
+    return {time[row], inputs(row), load(row), use[row] != 0};
+  }
 };
 
 /* sums of sines with changes of direction at all speeds, forces that differ between the tendons and vary */
@@ -96,30 +104,17 @@ inline Recording moved(std::size_t joints, std::size_t tendons, std::size_t samp
   return r;
 }
 
+inline estimator estimator_of(const Json& description) {
+  const std::vector<unsigned char> image = image_of(description);
+  return {image.data(), image.size()};
+}
+
 /* T and Δb [samples × n] of the description over the motion, by the estimation's own look at the core */
 inline std::pair<Numbers, Numbers> torques(const Json& description, const Recording& r) {
-  const std::vector<unsigned char> image = image_of(description);
-  char message[400] = "";
-  tendonfmu_estimator* e =
-      tendonfmu_estimator_create(image.data(), image.size(), nullptr, nullptr, message, sizeof message);
-  EXPECT_NE(e, nullptr) << message;
-  const tendonfmu_inputs inputs = r.inputs();
-  EXPECT_EQ(tendonfmu_estimator_add_recording(e, r.samples, r.time.data(), &inputs, TENDONFMU_JOINT_VELOCITIES, nullptr,
-                                              nullptr, nullptr),
-            TENDONFMU_OK)
-      << tendonfmu_estimator_last_error(e);
-  Numbers z;
-  for (std::size_t i = 0; i < tendonfmu_estimator_unknown_count(e); ++i) {
-    tendonfmu_unknown unknown;
-    tendonfmu_estimator_get_unknown(e, i, &unknown);
-    z.push_back(unknown.start);
-  }
-  Numbers torque(r.samples * r.joints), jump(r.samples * r.joints);
-  EXPECT_EQ(tendonfmu_estimator_jacobian(e, 0, z.data(), 0, r.samples, 1, torque.data(), jump.data(), nullptr, nullptr),
-            TENDONFMU_OK)
-      << tendonfmu_estimator_last_error(e);
-  tendonfmu_estimator_destroy(e);
-  return {torque, jump};
+  estimator e = estimator_of(description);
+  e.add_recording({r.samples, r.time.data(), r.inputs(), nullptr, nullptr, TENDONFMU_JOINT_VELOCITIES});
+  const estimator::block_means means = e.jacobian(0, e.start(), 0, r.samples, 1);
+  return {means.torque, means.jump};
 }
 
 /* Makes external_torque so that y = τ − external_torque is what the model says: T + b + e, with the walk and the noise
@@ -166,75 +161,67 @@ inline Recording made(const Json& description, std::size_t samples, double step,
   return r;
 }
 
-/* a learner, destroyed with it */
+/* A learner and what its last run left. */
 class Learner {
  public:
-  explicit Learner(const Json& description, std::size_t block = 8, double prior_std = 1.0) {
+  explicit Learner(const Json& description) {
     const std::vector<unsigned char> image = image_of(description);
-    char message[400] = "";
-    const tendonfmu_learner_options options = {prior_std, block, 0.0};
-    learner_ =
-        tendonfmu_learner_create(image.data(), image.size(), nullptr, nullptr, &options, message, sizeof message);
-    EXPECT_NE(learner_, nullptr) << message;
+    learner_ = tendonfmu::estimation::make_learner(image.data(), image.size());
   }
-  ~Learner() { tendonfmu_learner_destroy(learner_); }
-  Learner(const Learner&) = delete;
-  Learner& operator=(const Learner&) = delete;
 
-  tendonfmu_learner* get() const { return learner_; }
-  std::size_t unknowns() const { return tendonfmu_learner_unknown_count(learner_); }
+  tendonfmu::estimation::learner* operator->() const { return learner_.get(); }
+  std::size_t unknowns() const { return learner_->unknowns().size(); }
 
   void run(const Recording& r) {
-    const tendonfmu_inputs inputs = r.inputs();
     innovation.assign(r.samples * r.joints, 0.0);
     variance = innovation;
-    std::size_t done = 0;
-    ASSERT_EQ(tendonfmu_learner_run(learner_, r.samples, r.time.data(), &inputs, TENDONFMU_JOINT_VELOCITIES, r.load(),
-                                    r.use.data(), innovation.data(), variance.data(), nullptr, nullptr, &done),
-              TENDONFMU_OK)
-        << tendonfmu_learner_last_error(learner_);
-    ASSERT_EQ(done, r.samples);
+    ASSERT_EQ(learner_->run(r.arrays(), innovation.data(), variance.data()), r.samples);
   }
 
   /* linearised anew, twice, where the pass before arrived */
   void run_again(const Recording& r) {
     for (int pass = 2; pass <= 3; ++pass) {
-      ASSERT_EQ(tendonfmu_learner_begin_pass(learner_), TENDONFMU_OK);
+      learner_->begin_pass();
       run(r);
     }
   }
 
-  tendonfmu_unknown unknown(std::size_t index) const {
-    tendonfmu_unknown found;
-    EXPECT_EQ(tendonfmu_learner_get_unknown(learner_, index, &found), TENDONFMU_OK);
-    return found;
-  }
   Numbers z() const {
     Numbers z(unknowns());
-    EXPECT_EQ(tendonfmu_learner_get_unknowns(learner_, z.data(), nullptr), TENDONFMU_OK);
+    learner_->get_unknowns(z.data(), nullptr);
     return z;
   }
   Numbers covariance() const {
     Numbers matrix(unknowns() * unknowns());
-    EXPECT_EQ(tendonfmu_learner_get_unknowns(learner_, nullptr, matrix.data()), TENDONFMU_OK);
+    learner_->get_unknowns(nullptr, matrix.data());
     return matrix;
   }
   Numbers bias() const {
-    Numbers bias(tendonfmu_learner_joint_count(learner_));
-    EXPECT_EQ(tendonfmu_learner_get_bias(learner_, bias.data(), nullptr), TENDONFMU_OK);
+    Numbers bias(learner_->joint_count());
+    learner_->get_bias(bias.data(), nullptr);
     return bias;
   }
 
   Numbers innovation, variance;
 
  private:
-  tendonfmu_learner* learner_;
+  std::unique_ptr<tendonfmu::estimation::learner> learner_;
 };
+
+/* the line that a refusal says; nothing where nothing is refused */
+template <typename Call>
+std::string refusal(const Call& call) {
+  try {
+    call();
+  } catch (const std::invalid_argument& reason) {
+    return reason.what();
+  }
+  return "";
+}
 
 /* z of a description, as the learner's unknowns have it */
 inline Numbers truth_of(const Json& description) {
-  const Learner knows(description);
-  return knows.z();
+  return estimator_of(description).start();
 }
 
 /* Σ innovation²/variance over the samples from `first` on, divided by their number */

@@ -45,7 +45,7 @@ class Described {
 
 TEST(Unknowns, GoToTheDescriptionAndBack) {
   const Described d(made::learnable_finger());
-  const unknown_list all(d.finger(), nullptr, nullptr);
+  const unknown_list all(d.finger(), {}, {});
   std::mt19937_64 random(1);
   std::uniform_real_distribution<double> uniform;
   const Numbers start = d.start(), first = all.read(start.data()), again = all.write(first.data());
@@ -69,7 +69,7 @@ TEST(Unknowns, GoToTheDescriptionAndBack) {
 TEST(Unknowns, BoundsAreWithinWhatTheCoreTakes) {
   for (const Json& description : {small_finger(), made::learnable_finger()}) {
     const Described d(description);
-    const unknown_list all(d.finger(), nullptr, nullptr);
+    const unknown_list all(d.finger(), {}, {});
     std::mt19937_64 random(2);
     for (int corner = 0; corner < 100; ++corner) {
       Numbers z;
@@ -91,7 +91,7 @@ TEST(Unknowns, SharedNumbersHaveOneColumn) {
   const std::size_t a = d.at("tendons[1].pulley_friction[1].coulomb"),
                     b = d.at("tendons[1].edge_friction[1].positive.coulomb");
   group[a] = group[b] = 7;
-  const unknown_list shared(d.finger(), group.data(), nullptr);
+  const unknown_list shared(d.finger(), group, {});
   ASSERT_EQ(shared.count(), 1u);
   EXPECT_EQ(shared[0].parameters.size(), 2u);
   EXPECT_DOUBLE_EQ(shared[0].start, 0.5 * (0.015 + 0.02));

@@ -1,4 +1,4 @@
-"""The Python binding of the estimation (runtime/include/tendonfmu_estimation.h).
+"""The Python binding of the estimation (runtime/include/tendonfmu_estimation.hpp).
 
 If Eigen was not found when the package was built, there is no estimation: `Estimator` and `Learner` then raise
 `InputError(ESTIMATION_MISSING)`, and everything else works.
@@ -242,12 +242,12 @@ class Learner:
     @property
     def z(self) -> Numbers:
         """[u] present estimate of the unknowns."""
-        return np.asarray(self._learner.z())
+        return np.asarray(self._learner.unknown_values()[0])
 
     @property
     def covariance(self) -> Numbers:
         """[u, u] covariance of z."""
-        return np.asarray(self._learner.covariance())
+        return np.asarray(self._learner.unknown_values()[1])
 
     @property
     def bias(self) -> Numbers:

@@ -1,18 +1,19 @@
-// The products of symmetric_update.h against sums in long double, on every implementation that runs here.
-#include "symmetric_update.h"
+// The products of products.h against sums in long double, on every implementation that runs here.
+#include "products.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <random>
 #include <string>
 #include <vector>
 
+#include "allocation_count.h"
+
 namespace {
 
-using tendonfmu::estimation::symmetric_update;
+using tendonfmu::estimation::products;
 
 // What nobody may read: it would be seen in every result it reached.
 const double untouched = std::nan("");
@@ -51,21 +52,24 @@ struct Size {
   std::size_t p, k, stride;
 };
 
-// below, at and beyond tiles (4, 12), packings (48 columns, 128 steps), and what an estimation has
+// below, at and beyond the parts that are multiplied at once (48, 96), and what an estimation has
 const Size sizes[] = {{1, 1, 1},       {3, 2, 5},      {4, 4, 4},     {5, 7, 5},     {12, 12, 12},
                       {13, 129, 16},   {47, 3, 50},    {48, 48, 48},  {49, 128, 49}, {97, 130, 100},
                       {145, 257, 145}, {200, 64, 208}, {251, 49, 251}};
 
-class SymmetricUpdateTest : public testing::TestWithParam<int> {
+/* on every implementation that this processor and build have */
+class ProductsTest : public testing::TestWithParam<const products*> {
  protected:
-  void SetUp() override {
-    kernel_ = tendonfmu::estimation::symmetric_updates() + GetParam();
-    if (!kernel_->name) {
-      GTEST_SKIP() << "this processor or build has no further implementation";
-    }
-  }
-  const symmetric_update* kernel_ = nullptr;
+  const products* use_ = GetParam();
 };
+
+std::vector<const products*> implementations() {
+  std::vector<const products*> all{&tendonfmu::estimation::baseline_products};
+  if (&tendonfmu::estimation::best_products() != all[0]) {
+    all.push_back(&tendonfmu::estimation::best_products());
+  }
+  return all;
+}
 
 /* Rows of sums over term(row, column, s), s < count, beside what was there; NaN is left as it was. */
 template <class Term>
@@ -96,25 +100,25 @@ std::vector<double> zeros(std::size_t k, std::size_t p, std::size_t stride) {
   return rows;
 }
 
-TEST_P(SymmetricUpdateTest, AddsOuterProductsToTheLowerTriangleAlone) {
+TEST_P(ProductsTest, AddsOuterProductsToTheLowerTriangleAlone) {
   for (const auto& [p, k, stride] : sizes) {
     const std::vector<double> rows = some_rows(k, p, stride, 1), before = some_triangle(p, 2);
     std::vector<double> after = before;
-    kernel_->add_outer_products(after.data(), p, rows.data(), k, stride, -0.75);
+    use_->add_outer_products(after.data(), p, rows.data(), k, stride, -0.75);
     expect_sums(after, p, before, k, [&, stride = stride](std::size_t j, std::size_t i, std::size_t r) {
       return -0.75L * rows[r * stride + i] * rows[r * stride + j];
     });
   }
 }
 
-TEST_P(SymmetricUpdateTest, MultipliesByTheWholeSymmetricMatrix) {
+TEST_P(ProductsTest, MultipliesByTheWholeSymmetricMatrix) {
   for (const auto& [p, k, stride] : sizes) {
     std::vector<double> rows = some_rows(k, p, stride, 3), product(k * (p + 2), untouched);
     for (std::size_t at = 0; at < rows.size(); ++at) {  // columns of zeros, as of parameters that do not matter
       rows[at] = at % stride % 3 || std::isnan(rows[at]) ? rows[at] : 0.0;
     }
     const std::vector<double> lower = some_triangle(p, 4);
-    kernel_->multiply_symmetric(product.data(), p + 2, lower.data(), p, rows.data(), k, stride);
+    use_->multiply_symmetric(product.data(), p + 2, lower.data(), p, rows.data(), k, stride);
     expect_sums(product, p + 2, zeros(k, p, p + 2), p,
                 [&, p = p, stride = stride](std::size_t r, std::size_t i, std::size_t c) {
                   return static_cast<long double>(rows[r * stride + c]) * lower[std::min(i, c) * p + std::max(i, c)];
@@ -122,21 +126,31 @@ TEST_P(SymmetricUpdateTest, MultipliesByTheWholeSymmetricMatrix) {
   }
 }
 
-TEST_P(SymmetricUpdateTest, AddsWeightedRows) {
+TEST_P(ProductsTest, SolvesWithALowerTriangle) {
   for (const auto& [p, k, stride] : sizes) {
-    for (const std::size_t a : {1, 7, 50}) {
-      const std::vector<double> rows = some_rows(k, p, stride, 9), weights = some_rows(a, k, k + 1, 10);
-      const std::vector<double> before = some_rows(a, p, p + 3, 11);
-      std::vector<double> after = before;
-      kernel_->add_weighted_rows(after.data(), p + 3, a, weights.data(), k + 1, rows.data(), k, stride, p, -2.0);
-      expect_sums(after, p + 3, before, k, [&, k = k, stride = stride](std::size_t r, std::size_t i, std::size_t s) {
-        return -2.0L * weights[r * (k + 1) + s] * rows[s * stride + i];
-      });
+    std::vector<double> factor(k * (k + 1), untouched);
+    const std::vector<double> some = numbers(k * k, 9);
+    for (std::size_t r = 0; r < k; ++r) {
+      for (std::size_t c = 0; c <= r; ++c) {
+        factor[r * (k + 1) + c] = c < r ? 0.3 * some[r * k + c] / std::sqrt(static_cast<double>(k)) : 2.0;
+      }
+    }
+    const std::vector<double> before = some_rows(k, p, stride, 10);
+    std::vector<double> after = before;
+    use_->solve_lower(factor.data(), k + 1, after.data(), k, stride, p);
+    for (std::size_t at = 0; at < before.size(); ++at) {
+      const std::size_t row = at / stride, i = at % stride;
+      long double product = 0.0L;
+      for (std::size_t c = 0; c <= row && i < p; ++c) {
+        product += static_cast<long double>(factor[row * (k + 1) + c]) * after[c * stride + i];
+      }
+      ASSERT_EQ(std::isnan(after[at]), i >= p);
+      ASSERT_TRUE(i >= p || std::fabs(static_cast<double>(product) - before[at]) < 1e-14 * (10.0 + k)) << row << i;
     }
   }
 }
 
-TEST_P(SymmetricUpdateTest, MultipliesRowsByRows) {
+TEST_P(ProductsTest, MultipliesRowsByRows) {
   for (const auto& [p, k, stride] : sizes) {
     const std::size_t a = std::min<std::size_t>(k, 61);
     std::vector<double> left = some_rows(a, p, stride, 12), product(a * (k + 1), untouched);
@@ -144,7 +158,7 @@ TEST_P(SymmetricUpdateTest, MultipliesRowsByRows) {
       left[r * stride + p / 2] = 0.0;
     }
     const std::vector<double> right = some_rows(k, p, p, 13);
-    kernel_->multiply_transposed(product.data(), k + 1, left.data(), a, stride, right.data(), k, p, p);
+    use_->multiply_transposed(product.data(), k + 1, left.data(), a, stride, right.data(), k, p, p);
     expect_sums(product, k + 1, zeros(a, k, k + 1), p,
                 [&, p = p, stride = stride](std::size_t r, std::size_t s, std::size_t i) {
                   return static_cast<long double>(left[r * stride + i]) * right[s * p + i];
@@ -152,35 +166,33 @@ TEST_P(SymmetricUpdateTest, MultipliesRowsByRows) {
   }
 }
 
-TEST_P(SymmetricUpdateTest, GivesTheSameBitsForAPartAsForTheWhole) {
-  // an element's sum does not depend on the tile it falls into: unknowns that are left out change no other number
-  const std::size_t p = 61, k = 37;
-  const std::vector<double> rows = some_rows(k, p, p, 5);
-  std::vector<double> whole(p * p, 1.0);
-  kernel_->add_outer_products(whole.data(), p, rows.data(), k, p, 2.0);
-  for (std::size_t first = 1; first < 14; ++first) {
-    const std::size_t q = p - first;
-    std::vector<double> part(q * q, 1.0);
-    kernel_->add_outer_products(part.data(), q, rows.data() + first, k, p, 2.0);
-    for (std::size_t j = 0; j < q; ++j) {
-      const double* expected = whole.data() + (j + first) * p + j + first;
-      ASSERT_EQ(std::memcmp(part.data() + j * q + j, expected, (q - j) * sizeof(double)), 0) << first << " " << j;
-    }
-  }
+// of a size that fills all that is multiplied at once
+TEST_P(ProductsTest, AllocatesNothing) {
+#if defined(COUNTS_ALLOCATIONS)
+  ASSERT_TRUE(allocations_count());
+  const std::size_t p = 480, k = 260;
+  std::vector<double> rows = some_rows(k, p, p, 1), lower = some_triangle(p, 2), product(k * p), inner(k * k);
+  count_allocations_anew();
+  use_->add_outer_products(lower.data(), p, rows.data(), k, p, 1e-3);
+  use_->multiply_symmetric(product.data(), p, lower.data(), p, rows.data(), k, p);
+  use_->multiply_transposed(inner.data(), k, rows.data(), k, p, product.data(), k, p, p);
+  use_->solve_lower(inner.data(), k, rows.data(), k, p, p);
+  const long counted = counted_allocations();
+  EXPECT_EQ(counted, 0);
+#else
+  GTEST_SKIP() << "allocations are counted with glibc, without sanitizers";
+#endif
 }
 
-INSTANTIATE_TEST_SUITE_P(Kernels, SymmetricUpdateTest, testing::Values(0, 1));
+INSTANTIATE_TEST_SUITE_P(Processors, ProductsTest, testing::ValuesIn(implementations()),
+                         [](const auto& each) { return std::string(each.param->name); });
 
-TEST(SymmetricUpdate, TakesTheFastestFirstAndEndsWithThePortable) {
-  const symmetric_update* list = tendonfmu::estimation::symmetric_updates();
-  std::size_t last = 0;
-  while (list[last + 1].name) {
-    ++last;
-  }
-  EXPECT_STREQ(list[last].name, "portable");
+TEST(Products, TakesTheFastest) {
 #if defined(TENDONFMU_ESTIMATION_AVX2)
   const bool avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-  EXPECT_STREQ(list[0].name, avx2 ? "avx2" : "portable");
+  EXPECT_STREQ(tendonfmu::estimation::best_products().name, avx2 ? "avx2" : "baseline");
+#else
+  EXPECT_STREQ(tendonfmu::estimation::best_products().name, "baseline");
 #endif
 }
 
