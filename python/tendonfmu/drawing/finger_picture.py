@@ -71,11 +71,11 @@ def draw_finger(drawing: FingerDrawing) -> bytes:
         picture.line(tendon.spring, colour)
         picture.line(tendon.line, colour)
     for tendon, colour in coloured:
-        picture.discs(tendon.line[-1], 0.03, colour, colour)
-        picture.discs(tendon.pulleys, 0.04, "white", colour)
+        picture.discs(tendon.line[-1], 0.04, colour, colour)
+        picture.discs(tendon.pulleys, 0.065, "white", colour)
     for tendon, _ in coloured:
-        picture.discs(tendon.edges, 0.04, "white", EDGE_RED)
-        picture.discs(tendon.varying_edges, 0.045, EDGE_RED, EDGE_RED)
+        picture.discs(tendon.edges, 0.065, "white", EDGE_RED)
+        picture.discs(tendon.varying_edges, 0.065, EDGE_RED, EDGE_RED)
     return picture.png()
 
 
