@@ -190,13 +190,13 @@ static double kalman_gain(double predicted, double noise) {
   return total > 0.0 ? predicted / total : 0.0;
 }
 
-/* P⁻ and the variance of friction whose state nobody knows: it is distributed evenly */
-static double with_unknown(const tendonfmu_finger* f, size_t j, double variance) {
+/* K with the variance of friction whose state nobody knows beside P⁻: it is distributed evenly */
+static double gain_of_joint(const tendonfmu_finger* f, size_t j, double predicted, double noise, double gain) {
   if (!f->derived.settings.has_bands || f->guide.guides) {
-    return variance;
+    return gain;
   }
   const double unknown = f->scratch.unknown[j];
-  return variance + unknown * unknown * (1.0 / 3.0);
+  return kalman_gain(predicted + unknown * unknown * (1.0 / 3.0), noise);
 }
 
 /* Λ: what the filter absorbs */
@@ -211,7 +211,7 @@ void track_bias(tendonfmu_finger* f, double step, double noise) {
   double left = 1.0; /* without what is unknown the same at all joints */
   for (size_t j = 0; j < f->joint_lanes; ++j) {
     const double predicted = s->variance[j] + drift, gain = kalman_gain(predicted, noise);
-    s->gain[j] = kalman_gain(with_unknown(f, j, predicted), noise);
+    s->gain[j] = gain_of_joint(f, j, predicted, noise, gain);
     s->bias[j] += s->gain[j] * s->residual[j];
     s->friction[j] += s->gain[j] * s->residual[j];
     s->variance[j] = (1.0 - gain) * predicted;

@@ -15,10 +15,12 @@
  */
 
 /* NaN is out of range */
-static int row_in_range(const double* row, size_t count) {
+static int row_in_range(const double* row, size_t lanes) {
   int inside = 1;
-  for (size_t i = 0; i < count; ++i) {
-    inside &= fabs(row[i]) <= LARGEST_INPUT;
+  for (size_t i = 0; i < lanes; i += 4) {
+    for (size_t lane = i; lane < i + 4; ++lane) {
+      inside &= fabs(row[lane]) <= LARGEST_INPUT;
+    }
   }
   return inside;
 }
@@ -26,9 +28,11 @@ static int row_in_range(const double* row, size_t count) {
 static int inputs_in_range(const tendonfmu_finger* f) {
   const finger_scratch* s = &f->scratch;
   const int source = source_of(f);
-  return row_in_range(s->force, f->tendons) && (!uses_positions(f) || row_in_range(s->position, f->tendons)) &&
-         (source == TENDONFMU_TENDON_POSITIONS || row_in_range(s->angle, f->joints)) &&
-         (source != TENDONFMU_JOINT_VELOCITIES || row_in_range(s->velocity + f->joints * f->tendon_lanes, f->joints));
+  const double* velocity = s->velocity + f->joints * f->tendon_lanes;
+  return row_in_range(s->force, f->tendon_lanes) &&
+         (!uses_positions(f) || row_in_range(s->position, f->tendon_lanes)) &&
+         (source == TENDONFMU_TENDON_POSITIONS || row_in_range(s->angle, f->joint_lanes)) &&
+         (source != TENDONFMU_JOINT_VELOCITIES || row_in_range(velocity, f->joint_lanes));
 }
 
 /* --- kinematics -----------------------------------------------------------------------------------------------------

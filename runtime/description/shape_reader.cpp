@@ -190,21 +190,25 @@ const key_fact& fact_of(const std::string& object, const std::string& key) {
                        [&](const key_fact& fact) { return fact.object == object && fact.key == key; });
 }
 
-/* bands, and what else the method needs or does not take */
-void check_method(const json_node& contact, model_shape& shape) {
-  if (word_of(contact.member("method"), fact_of("contact", "method").words) == 0) {
+/* keys that belong to something else; before what they hold is read */
+void refuse_unused(const json_node& document) {
+  const json_node contact = document.member("contact"), method = contact.member("method"), tip = document.member("tip");
+  if (method.absent() || method.value() == fact_of("contact", "method").words.front()) {
     expect_none(contact, {"bands", "watches_motors"}, "contact.method \"paper\"; it belongs to \"bands\"");
-  } else {
-    read_list(contact.member("bands"), "contact.bands", fact_of("contact", "bands"), shape);
+  }
+  if (document.member("links").absent() && !tip.absent()) {
+    throw description_error(tip.path() + ": not allowed without links");
   }
 }
 
-void check_tip(const json_node& document) {
-  const json_node tip = document.member("tip");
+/* lists that must be there beside what is; what they hold has been read */
+void expect_used(const json_node& document) {
+  const json_node contact = document.member("contact");
+  if (contact.member("method").value() == fact_of("contact", "method").words.back()) {
+    contact.member("bands").expect_list(MODEL_MAX_BANDS, MODEL_MAX_BANDS, fact_of("contact", "bands").holds);
+  }
   if (!document.member("links").absent()) {
-    tip.expect_list(3, 3, fact_of("", "tip").holds);
-  } else if (!tip.absent()) {
-    throw description_error(tip.path() + ": not allowed without links");
+    document.member("tip").expect_list(3, 3, fact_of("", "tip").holds);
   }
 }
 
@@ -244,9 +248,9 @@ finger_shape read_shape(const json_node& document) {
   const json_node joints = document.member("joints"), tendons = document.member("tendons");
   shape.joints = static_cast<std::uint32_t>(joints.value().is_array() ? joints.size() : 0);
   shape.tendons = static_cast<std::uint32_t>(tendons.value().is_array() ? tendons.size() : 0);
+  refuse_unused(document);
   read_object(document, "", shape);
-  check_method(document.member("contact"), shape);
-  check_tip(document);
+  expect_used(document);
   check_estimated(document.member("estimated"));
   for (std::size_t j = 0; j < joints.size(); ++j) {
     finger.words.push_back(word_of_joint(joints.element(j)));

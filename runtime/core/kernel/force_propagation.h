@@ -270,8 +270,10 @@ static int find_friction(tendonfmu_finger* f) {
   const derived_numbers* d = &f->derived;
   const int transitions = friction_values(f);
   quad_sums tendon_friction[MODEL_MAX_JOINTS], load[MODEL_MAX_JOINTS];
-  memset(tendon_friction, 0, f->joint_lanes * sizeof *load);
-  memset(load, 0, f->joint_lanes * sizeof *load);
+  for (size_t j = 0; j < f->joint_lanes; ++j) {
+    memset(&tendon_friction[j], 0, sizeof tendon_friction[j]);
+    memset(&load[j], 0, sizeof load[j]);
+  }
   propagate_forces(f, tendon_friction, load);
   for (size_t j = 0; j < f->joint_lanes; j += QUAD_LANES) {
     const quad cover = quad_load(d->cover_stiffness + j) * (quad_load(s->angle + j) - quad_load(d->cover_rest + j));
