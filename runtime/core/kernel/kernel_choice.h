@@ -18,8 +18,9 @@ struct step_kernel {
   void (*restart_rests)(tendonfmu_finger* finger, double time);
 };
 
-extern const step_kernel step_plain, step_vector,
-    step_avx2; /* the last two where compiler and processor have vectors */
+extern const step_kernel step_plain;
+extern const step_kernel step_vector; /* this and the next where compiler and processor have vectors */
+extern const step_kernel step_avx2;
 
 /* The fastest kernel that processor and operating system allow ("auto"), or the one of that name; NULL where it cannot
  * run or is not built in. */
