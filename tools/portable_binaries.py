@@ -143,7 +143,7 @@ def compile_library(target: Target, folder: Path) -> Path:
     """The shared library of one target, in `folder`, which also takes what the linker leaves behind."""
     generate_table(folder)
     core = ROOT / "runtime" / "core"
-    include = [folder, ROOT / "runtime" / "include", core, core / "effects", core / "kernel", ROOT / "fmu_src"]
+    include = [folder, ROOT / "runtime" / "include", core, *core.glob("*/"), ROOT / "fmu_src"]
     library = folder / f"{STEMS[target.fmi]}{target.suffix}"
     command = [*zig_command(), "-target", target.triple, *FLAGS, f'-DTENDONFMU_VERSION="{version()}"', "-shared", "-s"]
     command += [f"-I{each}" for each in include] + ["-isystem", str(fmi_headers()), *target.options]

@@ -69,8 +69,8 @@ END_TEXT = """\
 _NOT_CODE = re.compile(
     r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\])*"|\'(?:\\.|[^\'\\])*\'|^[ \t]*#(?:[^\n\\]|\\.|\\\n)*', re.DOTALL | re.MULTILINE
 )
-# Words that begin a statement which names nothing for other files: the macros are those of inlining.h.
-_OWN = re.compile(r"(static|typedef|HOT_INLINE|COLD_STATIC)\b|(struct|enum|union)(\s+\w+)?\s*$")
+# Words that begin a statement which names nothing for other files: the macro is that of quad.h.
+_OWN = re.compile(r"(static|typedef|HOT_INLINE)\b|(struct|enum|union)(\s+\w+)?\s*$")
 
 
 def _outer_statements(text: str) -> Iterator[str]:

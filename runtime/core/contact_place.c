@@ -4,7 +4,7 @@
 
 #include <math.h>
 
-#include "rows_in_use.h"
+#include "sensor_fault.h"
 
 static const double told_share = 0.01;     /* of the largest eigenvalue: a tenth of the standard deviation's inverse */
 static const double least_square = 1e-200; /* of levers: below it a quotient by it may overflow */

@@ -7,7 +7,7 @@
 
 #include "extensions.h"
 #include "pseudo_inverse.h"
-#include "rows_in_use.h"
+#include "sensor_fault.h"
 
 static const double two_pi = 6.28318530717958647692;
 

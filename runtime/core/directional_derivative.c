@@ -7,7 +7,7 @@
 
 #include "extensions.h"
 #include "friction_memory.h"
-#include "rows_in_use.h"
+#include "sensor_fault.h"
 #include "slot_view.h"
 
 /* A number and its derivative along the direction. */
@@ -71,7 +71,7 @@ static void angles_along(const tendonfmu_finger* f, signal_derivative* d) {
 /* the inputs' direction as the model sees it: past what the extensions make of the signals */
 static void input_direction(const tendonfmu_finger* f, const tendonfmu_inputs* direction, signal_derivative* d) {
   memset(d, 0, sizeof *d);
-  const int source = (int)f->remembered.scalar[STATE_SOURCE];
+  const int source = source_of(f);
   effect_signals signals = {.joints = f->joints,
                             .tendons = f->tendons,
                             .source = source,
@@ -98,7 +98,7 @@ static void input_direction(const tendonfmu_finger* f, const tendonfmu_inputs* d
 /* angle and velocity along a direction of the signals */
 static void linearise_kinematics(linearisation* l, const signal_derivative* d) {
   const finger_state* s = &l->finger->remembered;
-  const int given = (int)s->scalar[STATE_SOURCE] == TENDONFMU_JOINT_VELOCITIES;
+  const int given = source_of(l->finger) == TENDONFMU_JOINT_VELOCITIES;
   for (size_t j = 0; j < l->finger->joints; ++j) {
     const double speed = given ? d->velocity[j] : s->scalar[STATE_VELOCITY_GAIN] * d->angle[j];
     l->angle[j] = (dual){s->angle[j], d->angle[j]};
@@ -116,29 +116,13 @@ static dual law_at(const double* law, int negative, dual speed) {
   return (dual){slopes.value, slopes.by_speed * speed.slope};
 }
 
-/* Laws of one effect: a single one, or those of the segment between two working points. */
-typedef struct effect_laws {
-  const double *below, *above; /* above NULL: no working points */
-  dual weight;
-} effect_laws;
-
-static effect_laws edge_laws(const linearisation* l, size_t j, size_t i) {
-  const tendonfmu_finger* f = l->finger;
-  const derived_numbers* d = &f->derived;
-  const dual angle = j ? l->angle[j - 1] : (dual){0.0, 0.0};
-  const size_t at = d->edge_record[j * f->tendon_lanes + i] + slot_segment(f, j, i, angle.value);
-  const double* segment = d->edge_segment + at * 2;
-  return (effect_laws){.below = d->edge_law + at * LAW_NUMBERS,
-                       .above = d->edge_law + (at + 1) * LAW_NUMBERS,
-                       .weight = {(angle.value - segment[0]) * segment[1], angle.slope * segment[1]}};
-}
-
 static dual magnitude_at(const effect_laws* laws, int negative, dual speed) {
   const dual below = law_at(laws->below, negative, speed);
   if (!laws->above) {
     return below;
   }
-  return sum(below, product(laws->weight, difference(law_at(laws->above, negative, speed), below)));
+  const dual weight = {laws->weight, laws->weight_slope};
+  return sum(below, product(weight, difference(law_at(laws->above, negative, speed), below)));
 }
 
 /* what friction rows make of F and b */
@@ -235,7 +219,8 @@ static void linearise_tendon(linearisation* l, size_t i, double force_slope) {
   dual acts = acting(f, i, &force);
   for (size_t j = 0; j < f->joints; ++j) {
     const size_t slot = j * lanes + i;
-    const effect_laws edge = edge_laws(l, j, i);
+    const dual angle = j ? l->angle[j - 1] : (dual){0.0, 0.0};
+    const effect_laws edge = edge_laws(f, j, i, angle.value, angle.slope);
     const dual edge_friction = friction_at(l, &edge, slot, threshold, velocity[j]);
     const dual edge_loss = loss_at(l, slot, 0, edge_friction, acts, motion[j], force.slope);
     jumped = sum(jumped, product(acts, bias_at(l, &edge, slot, threshold, velocity[j])));

@@ -13,9 +13,10 @@
 #include "kernel_choice.h"
 #include "message.h"
 #include "parameters.h"
-#include "rows_in_use.h"
 #include "samples.h"
 #include "saved_state.h"
+#include "sensor_fault.h"
+#include "step.h"
 
 #ifndef TENDONFMU_VERSION
 #error "TENDONFMU_VERSION comes from the build, which has it from CMakeLists.txt"
@@ -176,7 +177,7 @@ int tendonfmu_watches_sensors(const tendonfmu_finger* finger) {
 /* --- samples ------------------------------------------------------------------------------------------------------ */
 
 int tendonfmu_is_initialised(const tendonfmu_finger* finger) {
-  return finger && finger->remembered.scalar[STATE_INITIALISED] != 0.0;
+  return finger && !is_first(finger);
 }
 
 double tendonfmu_get_time(const tendonfmu_finger* finger) {
@@ -184,7 +185,7 @@ double tendonfmu_get_time(const tendonfmu_finger* finger) {
 }
 
 int tendonfmu_get_kinematics_source(const tendonfmu_finger* finger) {
-  return finger ? (int)finger->remembered.scalar[STATE_SOURCE] : 0;
+  return finger ? source_of(finger) : 0;
 }
 
 tendonfmu_status tendonfmu_set_kinematics_source(tendonfmu_finger* finger, int source) {
@@ -211,7 +212,7 @@ static tendonfmu_status take(tendonfmu_finger* finger, double time, const tendon
   if (tendonfmu_is_initialised(finger) && time == finger->remembered.scalar[STATE_TIME]) {
     return TENDONFMU_OK; /* the sample already taken */
   }
-  switch (finger->kernel->take_sample(finger, time)) {
+  switch (take_sample(finger, time)) {
     case SAMPLE_OUT_OF_RANGE: samples_name_bad_input(finger, time, inputs, error_line(finger)); break;
     case SAMPLE_OVERFLOWS:
       message_start(error_line(finger), "the sample at time ");
@@ -576,7 +577,7 @@ tendonfmu_status tendonfmu_set_kernel(tendonfmu_finger* finger, const char* name
   const step_kernel* kernel = kernel_choose(name);
   if (!kernel) {
     return fail(finger, TENDONFMU_BAD_ARGUMENT,
-                "kernel: expected \"auto\", \"plain\", or \"sse2\" or \"avx2\" where "
+                "kernel: expected \"auto\", \"plain\", or \"sse2\", \"avx2\" or \"neon\" where "
                 "processor and build have it");
   }
   finger->kernel = kernel;

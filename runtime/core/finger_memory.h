@@ -7,6 +7,8 @@
  * together, so what fig. 5 remembers of an effect is kept once per slot. */
 #pragma once
 
+#include <string.h>
+
 #include "contact_bands.h"
 #include "friction_law.h"
 #include "link_geometry.h"
@@ -300,14 +302,52 @@ struct tendonfmu_finger {
   char error[ERROR_BYTES];
 };
 
+/* Of four sums over every fourth lane of a row, in the order of the kernels (quad.h). */
+static inline double sum_of_lanes(const double of[4]) {
+  return (of[0] + of[2]) + (of[1] + of[3]);
+}
+
 /* What a joint's bands remember. */
 static inline band_memory* bands_of(const tendonfmu_finger* finger, size_t joint) {
   return (band_memory*)(void*)finger->remembered.bands + joint;
 }
 
+static inline int is_first(const tendonfmu_finger* finger) {
+  return finger->remembered.scalar[STATE_INITIALISED] == 0.0;
+}
+
+/* Angle of a joint at the sample before, by the rows that are in use now. */
+static inline double angle_before_step(const tendonfmu_finger* finger, size_t joint) {
+  const double angle = finger->remembered.angle[joint];
+  return finger->derived.settings.watches_sensors ? angle + finger->scratch.angle_shift[joint] : angle;
+}
+
 /* Row of the sensors in memory. */
 static inline double* sensor_row(const tendonfmu_finger* finger, double* sensor, sensor_row_kind row) {
   return sensor + (size_t)row * finger->tendon_lanes;
+}
+
+/* Rows of lanes: four at once, for which no library is called. */
+static inline void copy_lanes(double* to, const double* from, size_t lanes) {
+  for (size_t i = 0; i < lanes; i += 4) {
+    memcpy(to + i, from + i, 4 * sizeof *to);
+  }
+}
+
+static inline void clear_lanes(double* row, size_t lanes) {
+  for (size_t i = 0; i < lanes; i += 4) {
+    memset(row + i, 0, 4 * sizeof *row);
+  }
+}
+
+/* Where joint angles and velocities come from: TENDONFMU_TENDON_POSITIONS, … */
+static inline int source_of(const tendonfmu_finger* finger) {
+  return (int)finger->remembered.scalar[STATE_SOURCE];
+}
+
+static inline int uses_positions(const tendonfmu_finger* finger) {
+  const finger_settings* settings = &finger->derived.settings;
+  return source_of(finger) == TENDONFMU_TENDON_POSITIONS || settings->watches_motors || settings->watches_sensors;
 }
 
 /* R⁺ as the kinematics use it */

@@ -6,8 +6,6 @@
  * Fc, Fs − Fc, 1/vs, Fv (paper VII: 1/vs behaves, vs does not). */
 #pragma once
 
-#include "exponential.h"
-
 enum { LAW_COULOMB, LAW_DROP, LAW_RATE, LAW_VISCOUS, LAW_SIDE_NUMBERS };
 
 enum { LAW_NUMBERS = 2 * LAW_SIDE_NUMBERS }; /* positive side, negative side */
@@ -19,7 +17,7 @@ typedef struct law_slopes {
   double decay;    /* exp(−|v|/vs) */
 } law_slopes;
 
-/* side [LAW_SIDE_NUMBERS]; speed >= 0. The value has the bits of law_magnitude(). */
+/* side [LAW_SIDE_NUMBERS]; speed >= 0. The value has the bits of the kernels. */
 law_slopes law_with_slopes(const double* side, double speed);
 
 /* exp(−x) for x >= 0 as the kernels have it, and 1 − exp(−x) without cancellation. */
@@ -31,9 +29,3 @@ double law_logarithm(double x);
 
 /* Fills one side of a law from the numbers of a description. */
 void law_pack_side(double* side, double fs, double fc, double vs, double fv);
-
-/* Fc + (Fs − Fc)·exp(−|v|/vs) + Fv·|v| for four sides at once; exponent(v) is the smooth part of eq. (1) */
-HOT_INLINE quad law_magnitude(const quad side[LAW_SIDE_NUMBERS], quad speed) {
-  const quad stribeck = quad_mul(side[LAW_DROP], exp_of_minus(quad_mul(speed, side[LAW_RATE])));
-  return quad_add(quad_add(side[LAW_COULOMB], stribeck), quad_mul(side[LAW_VISCOUS], speed));
-}

@@ -2,8 +2,11 @@
 
 #include "friction_memory.h"
 
+#include <string.h>
+
 #include "effect_facts.h"
 #include "friction_law.h"
+#include "kernel_choice.h"
 
 #define LEAST_DISTANCE 1e-150 /* m, rad: however short, no product in a step overflows */
 #define STEEPEST       1e290  /* 1/m, 1/rad, of z */
@@ -123,7 +126,8 @@ static void set_decay(const friction_element* element, size_t slot, double step)
   element->soft[slot] = gain * element->per_distance[slot];
 }
 
-void find_decay(tendonfmu_finger* f, double step) {
+/* what a and g make of every place in a step of this length, s */
+static void find_decay(tendonfmu_finger* f, double step) {
   for (size_t e = 0; e < f->memory.elements; ++e) {
     for (size_t slot = 0; slot < f->slots; ++slot) {
       set_decay(&f->memory.element[e], slot, step);
@@ -146,6 +150,34 @@ void find_memory(tendonfmu_finger* f) {
     find_elements(f, slot);
   }
   find_decay(f, 0.0);
+}
+
+void turn_places(tendonfmu_finger* f, double step) {
+  const finger_scratch* s = &f->scratch;
+  const int first = is_first(f), given = source_of(f) == TENDONFMU_JOINT_VELOCITIES;
+  const size_t joint_row = f->joints * f->tendon_lanes;
+  for (size_t j = 0; j < f->joint_lanes; ++j) {
+    const double travel = given ? s->velocity[joint_row + j] * step : s->angle[j] - angle_before_step(f, j);
+    s->travelled[joint_row + j] = first ? 0.0 : travel;
+    s->own_limit[j] = 0.0;
+  }
+  f->kernel->tendon_velocities(f, s->travelled);
+  f->memory.stretch = first ? 0.0 : f->memory.compliance;
+  if (f->memory.relaxes && f->memory.step != (first ? 0.0 : step)) {
+    find_decay(f, first ? 0.0 : step);
+  }
+}
+
+void remember_elements(tendonfmu_finger* f) {
+  const finger_state* to = &f->remembered;
+  const finger_scratch* from = &f->scratch;
+  const size_t bytes = 2 * f->slots * sizeof(double);
+  memcpy(to->element, from->element, f->memory.elements * bytes);
+  memcpy(to->by_turning, from->by_turning, bytes);
+  memcpy(to->by_limit, from->by_limit, bytes);
+  if (f->memory.compliance > 0.0) {
+    memcpy(to->tension, from->tension, bytes);
+  }
 }
 
 /* --- friction as a torque -------------------------------------------------------------------------------------------

@@ -12,8 +12,11 @@ static inline int remembers_at(const tendonfmu_finger* finger, size_t slot) {
 /* Fills finger->memory from the rows of presliding and cord_stretch; whenever numbers were derived anew. */
 void find_memory(tendonfmu_finger* finger);
 
-/* What a and g make of every place in a step of this length, s. */
-void find_decay(tendonfmu_finger* finger, double step);
+/* The travel of every place in this sample, and what relaxation makes of it; the kinematics are known. */
+void turn_places(tendonfmu_finger* finger, double step);
+
+/* The sample is accepted. */
+void remember_elements(tendonfmu_finger* finger);
 
 /* Friction as a torque where its places have a memory: z of a row of this size (N), into what it will remember; at a
  * joint its size (N·m), into the limit there. */

@@ -6,8 +6,7 @@
 #include <string.h>
 
 #include "contact_place.h"
-#include "kernel_choice.h"
-#include "rows_in_use.h"
+#include "sensor_fault.h"
 
 enum { MOST_ROWS = 4 };
 
@@ -22,12 +21,11 @@ typedef struct input_row {
 /* the rows that the kinematics source, contact.watches_motors and sensor_fault use; returns how many */
 static size_t used_rows(const tendonfmu_finger* f, const tendonfmu_inputs* inputs, input_row rows[MOST_ROWS]) {
   const finger_scratch* s = &f->scratch;
-  const int source = (int)f->remembered.scalar[STATE_SOURCE];
+  const int source = source_of(f);
   const size_t m = f->tendons, n = f->joints;
   size_t count = 0;
   rows[count++] = (input_row){"tendon_force", "N", inputs->tendon_force, m, s->force};
-  if (source == TENDONFMU_TENDON_POSITIONS || f->derived.settings.watches_motors ||
-      f->derived.settings.watches_sensors) {
+  if (uses_positions(f)) {
     rows[count++] = (input_row){"tendon_position", "m", inputs->tendon_position, m, s->position};
   }
   if (source != TENDONFMU_TENDON_POSITIONS) {
@@ -41,7 +39,7 @@ static size_t used_rows(const tendonfmu_finger* f, const tendonfmu_inputs* input
 }
 
 static int check_time(const tendonfmu_finger* f, double time, message_line message) {
-  const int initialised = f->remembered.scalar[STATE_INITIALISED] != 0.0;
+  const int initialised = !is_first(f);
   const double before = f->remembered.scalar[STATE_TIME];
   if (fabs(time) <= LARGEST_TIME && (!initialised || time >= before)) {
     return 0;

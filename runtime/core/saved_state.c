@@ -6,9 +6,8 @@
 
 #include "bytes.h"
 #include "derived_numbers.h"
-#include "kernel_choice.h"
 #include "parameters.h"
-#include "rows_in_use.h"
+#include "sensor_fault.h"
 
 enum { HEADER_BYTES = 40, HASHED_FROM = 32, STATE_VERSION = 2 };
 

@@ -14,6 +14,17 @@ size_t slot_segment(const tendonfmu_finger* finger, size_t joint, size_t tendon,
   return passed;
 }
 
+effect_laws edge_laws(const tendonfmu_finger* finger, size_t joint, size_t tendon, double angle, double angle_slope) {
+  const derived_numbers* d = &finger->derived;
+  const size_t slot = joint * finger->tendon_lanes + tendon;
+  const size_t record = d->edge_record[slot] + slot_segment(finger, joint, tendon, angle);
+  const double* segment = d->edge_segment + 2 * record;
+  return (effect_laws){.below = d->edge_law + record * LAW_NUMBERS,
+                       .above = d->edge_law + (record + 1) * LAW_NUMBERS,
+                       .weight = (angle - segment[0]) * segment[1],
+                       .weight_slope = angle_slope * segment[1]};
+}
+
 static void put_side(double rows[LAW_SIDE_NUMBERS][4], size_t lane, const double* law, int negative) {
   for (int k = 0; k < LAW_SIDE_NUMBERS; ++k) {
     rows[k][lane] = law[negative * LAW_SIDE_NUMBERS + k];

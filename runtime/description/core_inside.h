@@ -21,6 +21,6 @@ extern "C" {
 #include "model_image.h"
 #include "parameters.h"
 #include "pseudo_inverse.h"
-#include "rows_in_use.h"
+#include "sensor_fault.h"
 #include "slot_view.h"
 }

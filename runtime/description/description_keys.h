@@ -1,4 +1,4 @@
-/* What the table of keys says of each object of the description; description_keys.cpp is generated from it. */
+/* The table of keys as the reader needs it; description_keys.cpp is generated from it. */
 #pragma once
 
 #include <cstdint>
@@ -7,22 +7,37 @@
 
 namespace tendonfmu {
 
-/* A key of a list with one number per joint, or of numbers with an option bit of their own. */
-struct number_key {
-  const char* key;
-  bool per_joint;
-  bool required;
-  const char* unit;     /* as errors say it: "N.m per N" */
-  std::uint32_t option; /* of the model image, where the key has one of its own; 0: none */
+/* number: read by its path in the core; per_joint: a list of them; vector: three. */
+enum class key_kind {
+  number,
+  per_joint,
+  vector,
+  object,
+  list,
+  law,
+  laws,
+  edges,
+  flag,
+  word,
+  name,
+  format,
+  extensions,
+  estimates
 };
 
-/* The keys of an object, and the number_keys among them, in the order of the table. `object` is a path without indices,
- * such as "contact.rest" or "joints.cover"; "" is the document. */
-const std::vector<std::string>& keys_of(const std::string& object);
-std::vector<number_key> numbers_of(const std::string& object);
+struct key_fact {
+  const char* object; /* whose key it is: a path without indices, such as "contact.bands"; "" is the document */
+  const char* key;
+  key_kind kind;
+  bool required;
+  std::uint32_t option;      /* of the model image: set where the key is there, a flag true, a word not the first */
+  std::uint32_t least, most; /* elements of a list; 0: one per joint */
+  const char* holds;         /* what a list holds, as errors say it */
+  std::vector<std::string> words; /* the first one where it is left out */
+};
 
-/* The words that a key takes; the first one where it is left out. */
-const std::vector<std::string>& words_of(const std::string& path);
+/* Of all objects, in the order in which errors name them. */
+const std::vector<key_fact>& key_facts();
 
 /* The numbers of one side of a friction law. */
 const std::vector<std::string>& law_keys();

@@ -15,18 +15,12 @@ constexpr std::size_t max_name_bytes = 200;
 
 const std::vector<std::string> sides = {"positive", "negative"};
 
-std::vector<std::string> with(std::vector<std::string> keys, const std::vector<std::string>& more) {
+/* of a law, and of an edge, which may be working points in its place */
+std::vector<std::string> any_law_keys(const std::vector<std::string>& more = {}) {
+  std::vector<std::string> keys = law_keys();
+  keys.insert(keys.end(), sides.begin(), sides.end());
   keys.insert(keys.end(), more.begin(), more.end());
   return keys;
-}
-
-/* of a law, and of an edge, which may be working points in its place */
-std::vector<std::string> any_law_keys() {
-  return with(law_keys(), sides);
-}
-
-std::vector<std::string> edge_keys() {
-  return with(any_law_keys(), {"angles", "laws"});
 }
 
 /* names become file names and XML attributes */
@@ -38,13 +32,6 @@ void check_name(const json_node& node) {
   }
   if (!plain) {
     node.refuse("a name of 1 to " + std::to_string(max_name_bytes) + " bytes without control characters");
-  }
-}
-
-void check_optional_name(const json_node& parent) {
-  const json_node name = parent.member("name");
-  if (!name.absent()) {
-    check_name(name);
   }
 }
 
@@ -91,7 +78,7 @@ void read_edge(const json_node& edge, std::vector<std::uint32_t>& words) {
     words.push_back(0);
     return;
   }
-  edge.expect_keys(edge_keys());
+  edge.expect_keys(any_law_keys({"angles", "laws"}));
   if (edge.member("angles").absent() && edge.member("laws").absent()) {
     words.push_back(1);
     words.push_back(kind_of_law(edge));
@@ -100,78 +87,7 @@ void read_edge(const json_node& edge, std::vector<std::uint32_t>& words) {
   read_working_points(edge, words);
 }
 
-/* --- numbers of an object ----------------------------------------------------------------------------------------- */
-
-/* the lists of an object that have one number per joint: those that are there, or must be, have so many */
-void check_lists(const json_node& parent, const std::string& object, std::uint32_t joints) {
-  for (const number_key& number : numbers_of(object)) {
-    const json_node list = parent.member(number.key);
-    if (number.per_joint && (number.required || !list.absent())) {
-      list.expect_list(joints, joints, "numbers in " + std::string(number.unit) + ", one per joint");
-    }
-  }
-}
-
-/* the option bits of the numbers that are there */
-std::uint32_t given_options(const json_node& parent, const std::string& object) {
-  std::uint32_t options = 0;
-  for (const number_key& number : numbers_of(object)) {
-    options |= parent.member(number.key).absent() ? 0u : number.option;
-  }
-  return options;
-}
-
-/* --- joints and tendons ------------------------------------------------------------------------------------------- */
-
-std::uint32_t read_joint(const json_node& joint) {
-  joint.expect_keys(keys_of("joints"));
-  check_optional_name(joint);
-  const json_node cover = joint.member("cover");
-  cover.expect_keys_if_present(keys_of("joints.cover"));
-  return (cover.absent() ? 0u : 1u) | static_cast<std::uint32_t>(read_law(joint.member("friction"))) << 1 |
-         static_cast<std::uint32_t>(read_law(joint.member("load_friction"))) << 3;
-}
-
-/* friction lists may be left out or short */
-void check_friction_list(const json_node& list, std::uint32_t joints) {
-  if (!list.absent()) {
-    list.expect_list(0, joints, "laws or nulls, one per joint");
-  }
-}
-
-void read_tendon(const json_node& tendon, std::uint32_t joints, std::vector<std::uint32_t>& words) {
-  tendon.expect_keys(keys_of("tendons"));
-  check_optional_name(tendon);
-  const json_node bidirectional = tendon.member("bidirectional");
-  const json_node pulleys = tendon.member("pulley_friction"), edges = tendon.member("edge_friction");
-  words.push_back(!bidirectional.absent() && bidirectional.boolean());
-  check_lists(tendon, "tendons", joints);
-  check_friction_list(pulleys, joints);
-  check_friction_list(edges, joints);
-  const json_node last = pulleys.element(joints - 1);
-  if (!last.absent()) {
-    last.refuse("null, since no joint comes after the last pulley");
-  }
-  for (std::uint32_t j = 0; j < joints; ++j) {
-    words.push_back(read_law(pulleys.element(j)));
-  }
-  for (std::uint32_t j = 0; j < joints; ++j) {
-    read_edge(edges.element(j), words);
-  }
-}
-
-/* --- the finger as a whole ---------------------------------------------------------------------------------------- */
-
-/* an object that may be left out: the option bit that says it is there, or 0 */
-std::uint32_t read_object(const json_node& object, const std::string& name, std::uint32_t joints,
-                          std::uint32_t option) {
-  if (object.absent()) {
-    return 0u;
-  }
-  object.expect_keys(keys_of(name));
-  check_lists(object, name, joints);
-  return option;
-}
+/* --- objects, by the table of keys -------------------------------------------------------------------------------- */
 
 /* position of a word among those allowed; the first one where it is left out */
 std::size_t word_of(const json_node& node, const std::vector<std::string>& words) {
@@ -188,51 +104,112 @@ std::size_t word_of(const json_node& node, const std::vector<std::string>& words
   return 0;
 }
 
-std::uint32_t read_bias_options(const json_node& bias, std::uint32_t joints) {
-  check_lists(bias, "bias", joints);
-  return given_options(bias, "bias") |
-         (word_of(bias.member("forgetting"), words_of("bias.forgetting")) ? unsigned{MODEL_FORGETS_BY_ABSORPTION} : 0u);
-}
+void read_object(const json_node& node, const std::string& object, model_shape& shape);
 
-/* bands, and what else the method needs or does not take */
-std::uint32_t read_method(const json_node& contact, std::uint32_t joints) {
-  if (word_of(contact.member("method"), words_of("contact.method")) == 0) {
-    expect_none(contact, {"bands", "watches_motors"}, "contact.method \"paper\"; it belongs to \"bands\"");
-    return 0u;
+void read_list(const json_node& list, const std::string& object, const key_fact& fact, model_shape& shape) {
+  list.expect_list(fact.most ? fact.least : shape.joints, fact.most ? fact.most : shape.joints, fact.holds);
+  for (std::size_t k = 0; k < list.size(); ++k) {
+    read_object(list.element(k), object, shape);
   }
-  const json_node bands = contact.member("bands"), motors = contact.member("watches_motors");
-  bands.expect_list(MODEL_MAX_BANDS, MODEL_MAX_BANDS, "objects with the numbers of each band");
-  for (std::size_t k = 0; k < MODEL_MAX_BANDS; ++k) {
-    check_lists(bands.element(k).expect_keys(keys_of("contact.bands")), "contact.bands", joints);
+}
+
+/* what one key holds, and its option bit; laws and what else has a rule of its own are left to their readers */
+void read_key(const json_node& node, const std::string& path, const key_fact& fact, model_shape& shape) {
+  if (node.absent() && !fact.required) {
+    return;
   }
-  return unsigned{MODEL_DETECTS_BY_BANDS} |
-         (!motors.absent() && motors.boolean() ? unsigned{MODEL_WATCHES_MOTORS} : 0u);
+  bool is_set = true;
+  switch (fact.kind) {
+    case key_kind::per_joint: node.expect_list(shape.joints, shape.joints, fact.holds); break;
+    case key_kind::vector: node.expect_list(3, 3, fact.holds); break;
+    case key_kind::format:
+      if (node.value() != format_name) {
+        node.refuse("\"" + std::string(format_name) + "\"");
+      }
+      break;
+    case key_kind::object: read_object(node, path, shape); break;
+    case key_kind::list: read_list(node, path, fact, shape); break;
+    case key_kind::name: check_name(node); break;
+    case key_kind::flag: is_set = node.boolean(); break;
+    case key_kind::word: is_set = word_of(node, fact.words) > 0; break;
+    default: break;
+  }
+  shape.options |= is_set ? fact.option : 0u;
 }
 
-std::uint32_t read_contact_options(const json_node& contact, std::uint32_t joints) {
-  contact.expect_keys(keys_of("contact"));
-  check_lists(contact, "contact", joints);
-  return read_method(contact, joints) | given_options(contact, "contact");
-}
-
-std::uint32_t read_links(const json_node& document, std::uint32_t joints) {
-  const json_node links = document.member("links"), tip = document.member("tip");
-  if (links.absent()) {
-    if (!tip.absent()) {
-      throw description_error(tip.path() + ": not allowed without links");
+void read_object(const json_node& node, const std::string& object, model_shape& shape) {
+  std::vector<std::string> keys;
+  for (const key_fact& fact : key_facts()) {
+    if (object == fact.object) {
+      keys.emplace_back(fact.key);
     }
-    return 0u;
   }
-  links.expect_list(joints, joints, "links, one per joint");
+  node.expect_keys(keys);
+  for (const key_fact& fact : key_facts()) {
+    if (object == fact.object) {
+      read_key(node.member(fact.key), object.empty() ? fact.key : object + "." + fact.key, fact, shape);
+    }
+  }
+}
+
+/* --- which laws joints and tendons have --------------------------------------------------------------------------- */
+
+std::uint32_t word_of_joint(const json_node& joint) {
+  return (joint.member("cover").absent() ? 0u : 1u) |
+         static_cast<std::uint32_t>(read_law(joint.member("friction"))) << 1 |
+         static_cast<std::uint32_t>(read_law(joint.member("load_friction"))) << 3;
+}
+
+/* friction lists may be left out or short */
+json_node friction_list(const json_node& tendon, const char* key, std::uint32_t joints) {
+  const json_node list = tendon.member(key);
+  return list.absent() ? list : list.expect_list(0, joints, "laws or nulls, one per joint");
+}
+
+void add_words_of_tendon(const json_node& tendon, std::uint32_t joints, std::vector<std::uint32_t>& words) {
+  const json_node bidirectional = tendon.member("bidirectional");
+  const json_node pulleys = friction_list(tendon, "pulley_friction", joints);
+  const json_node edges = friction_list(tendon, "edge_friction", joints);
+  words.push_back(!bidirectional.absent() && bidirectional.boolean());
+  const json_node last = pulleys.element(joints - 1);
+  if (!last.absent()) {
+    last.refuse("null, since no joint comes after the last pulley");
+  }
   for (std::uint32_t j = 0; j < joints; ++j) {
-    const json_node link = links.element(j).expect_keys(keys_of("links"));
-    link.member("axis").expect_list(3, 3, "numbers, the direction of the joint's axis");
-    if (!link.member("offset").absent()) {
-      link.member("offset").expect_list(3, 3, "numbers in m");
-    }
+    words.push_back(read_law(pulleys.element(j)));
   }
-  tip.expect_list(3, 3, "numbers in m, the fingertip in the last link's frame");
-  return MODEL_HAS_LINKS;
+  for (std::uint32_t j = 0; j < joints; ++j) {
+    read_edge(edges.element(j), words);
+  }
+}
+
+/* --- rules between keys ------------------------------------------------------------------------------------------- */
+
+const key_fact& fact_of(const std::string& object, const std::string& key) {
+  return *std::find_if(key_facts().begin(), key_facts().end(),
+                       [&](const key_fact& fact) { return fact.object == object && fact.key == key; });
+}
+
+/* keys that belong to something else; before what they hold is read */
+void refuse_unused(const json_node& document) {
+  const json_node contact = document.member("contact"), method = contact.member("method"), tip = document.member("tip");
+  if (method.absent() || method.value() == fact_of("contact", "method").words.front()) {
+    expect_none(contact, {"bands", "watches_motors"}, "contact.method \"paper\"; it belongs to \"bands\"");
+  }
+  if (document.member("links").absent() && !tip.absent()) {
+    throw description_error(tip.path() + ": not allowed without links");
+  }
+}
+
+/* lists that must be there beside what is; what they hold has been read */
+void expect_used(const json_node& document) {
+  const json_node contact = document.member("contact");
+  if (contact.member("method").value() == fact_of("contact", "method").words.back()) {
+    contact.member("bands").expect_list(MODEL_MAX_BANDS, MODEL_MAX_BANDS, fact_of("contact", "bands").holds);
+  }
+  if (!document.member("links").absent()) {
+    document.member("tip").expect_list(3, 3, fact_of("", "tip").holds);
+  }
 }
 
 /* Metadata: no output depends on it. */
@@ -262,51 +239,31 @@ void refuse_dropped(const json_node& document) {
   }
 }
 
-void check_top(const json_node& document) {
-  refuse_dropped(document);
-  document.expect_keys(keys_of(""));
-  const json_node format = document.member("format");
-  if (format.absent() || format.value() != format_name) {
-    format.refuse("\"" + std::string(format_name) + "\"");
-  }
-  check_name(document.member("name"));
-  check_estimated(document.member("estimated"));
-  for (const std::string name : {"velocity_threshold", "bias"}) {
-    document.member(name).expect_keys_if_present(keys_of(name));
-  }
-}
-
 }  // namespace
 
 finger_shape read_shape(const json_node& document) {
   finger_shape finger;
-  check_top(document);
+  model_shape& shape = finger.shape;
+  refuse_dropped(document);
   const json_node joints = document.member("joints"), tendons = document.member("tendons");
-  joints.expect_list(1, MODEL_MAX_JOINTS, "joints");
-  tendons.expect_list(1, MODEL_MAX_TENDONS, "tendons");
-  finger.shape.joints = static_cast<std::uint32_t>(joints.size());
-  finger.shape.tendons = static_cast<std::uint32_t>(tendons.size());
+  shape.joints = static_cast<std::uint32_t>(joints.value().is_array() ? joints.size() : 0);
+  shape.tendons = static_cast<std::uint32_t>(tendons.value().is_array() ? tendons.size() : 0);
+  refuse_unused(document);
+  read_object(document, "", shape);
+  expect_used(document);
+  check_estimated(document.member("estimated"));
   for (std::size_t j = 0; j < joints.size(); ++j) {
-    finger.words.push_back(read_joint(joints.element(j)));
+    finger.words.push_back(word_of_joint(joints.element(j)));
   }
   for (std::size_t i = 0; i < tendons.size(); ++i) {
-    read_tendon(tendons.element(i), finger.shape.joints, finger.words);
+    add_words_of_tendon(tendons.element(i), shape.joints, finger.words);
   }
-  for (std::size_t i = 0; i < tendons.size(); ++i) {
-    finger.shape.options |= given_options(tendons.element(i), "tendons");
-  }
-  finger.shape.options |=
-      read_bias_options(document.member("bias"), finger.shape.joints) |
-      read_contact_options(document.member("contact"), finger.shape.joints) |
-      given_options(document.member("velocity_threshold"), "velocity_threshold") |
-      read_links(document, finger.shape.joints) |
-      read_object(document.member("sensor_fault"), "sensor_fault", finger.shape.joints, MODEL_HAS_SENSOR_FAULT);
-  read_extensions(document.member("extensions"), finger.shape.joints, finger.shape.tendons, finger.extensions);
-  finger.shape.extension_count = static_cast<std::uint32_t>(finger.extensions.size() / MODEL_EXTENSION_WORDS);
-  finger.shape.word_count = static_cast<std::uint32_t>(finger.words.size());
-  finger.shape.words = finger.words.data();
-  finger.shape.extensions = finger.extensions.data();
-  finger.shape.parameter_count = model_count_parameters(&finger.shape);
+  read_extensions(document.member("extensions"), shape.joints, shape.tendons, finger.extensions);
+  shape.extension_count = static_cast<std::uint32_t>(finger.extensions.size() / MODEL_EXTENSION_WORDS);
+  shape.word_count = static_cast<std::uint32_t>(finger.words.size());
+  shape.words = finger.words.data();
+  shape.extensions = finger.extensions.data();
+  shape.parameter_count = model_count_parameters(&shape);
   return finger;
 }
 

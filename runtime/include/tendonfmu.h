@@ -242,7 +242,7 @@ tendonfmu_status tendonfmu_reset(tendonfmu_finger* finger);
 
 /* The step exists for several instruction sets; all give the same bits. Creation takes the fastest one that the
  * processor and operating system allow. */
-const char* tendonfmu_get_kernel(const tendonfmu_finger* finger); /* "plain", "sse2" or "avx2" */
+const char* tendonfmu_get_kernel(const tendonfmu_finger* finger); /* "plain", "sse2", "avx2" or "neon" */
 
 /* Takes another one, "auto" for the choice above; TENDONFMU_BAD_ARGUMENT where it cannot run here. */
 tendonfmu_status tendonfmu_set_kernel(tendonfmu_finger* finger, const char* name);

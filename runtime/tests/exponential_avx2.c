@@ -1,16 +1,16 @@
 /* exp(−x) of the avx2 kernel as a function, for exponential_test.cpp. */
 #include "floating_point.h"
 
-#if defined(__x86_64__) || defined(_M_X64)
+#if defined(__GNUC__) && defined(__x86_64__)
 
 #if defined(__clang__)
 #pragma clang attribute push(__attribute__((target("avx2"))), apply_to = function)
-#elif defined(__GNUC__)
+#else
 #pragma GCC push_options
 #pragma GCC target("avx2")
 #endif
 
-#define TENDONFMU_QUAD_AVX2
+#define TENDONFMU_QUAD_LANES 4
 #include "exponential.h"
 #include "exponential_kernels.h"
 
@@ -22,7 +22,7 @@ void exponential_avx2(const double* x, double* result, size_t count) {
 
 #if defined(__clang__)
 #pragma clang attribute pop
-#elif defined(__GNUC__)
+#else
 #pragma GCC pop_options
 #endif
 

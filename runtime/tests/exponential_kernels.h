@@ -4,5 +4,5 @@
 #include <stddef.h>
 
 void exponential_plain(const double* x, double* result, size_t count);
-void exponential_sse2(const double* x, double* result, size_t count);
+void exponential_vector(const double* x, double* result, size_t count);
 void exponential_avx2(const double* x, double* result, size_t count);

@@ -145,10 +145,17 @@ void expect_bits_of_plain(const std::string& name, void (*kernel)(const double*,
   EXPECT_EQ(std::memcmp(a.data(), b.data(), a.size() * sizeof(Four)), 0);
 }
 
-#if defined(__x86_64__) || defined(_M_X64)
-TEST(ExponentialKernels, Sse2HasTheBitsOfPlain) {
-  expect_bits_of_plain("sse2", exponential_sse2);
+#if defined(__GNUC__) && (defined(__x86_64__) || defined(__aarch64__))
+TEST(ExponentialKernels, VectorsHaveTheBitsOfPlain) {
+#if defined(__x86_64__)
+  expect_bits_of_plain("sse2", exponential_vector);
+#else
+  expect_bits_of_plain("neon", exponential_vector);
+#endif
 }
+#endif
+
+#if defined(__GNUC__) && defined(__x86_64__)
 TEST(ExponentialKernels, Avx2HasTheBitsOfPlain) {
   expect_bits_of_plain("avx2", exponential_avx2);
 }

@@ -240,7 +240,7 @@ struct Finger {
 inline std::vector<const char*> kernels() {
   const Finger finger;
   std::vector<const char*> found;
-  for (const char* kernel : {"plain", "sse2", "avx2"}) {
+  for (const char* kernel : {"plain", "sse2", "avx2", "neon"}) {
     if (tendonfmu_set_kernel(finger, kernel) == TENDONFMU_OK) {
       found.push_back(kernel);
     }

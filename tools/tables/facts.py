@@ -19,7 +19,7 @@ FOLDER = ROOT / "runtime" / "description"
 KINDS = ("object", "list", "law", "laws", "edges", "flag", "word", "name", "format", "extensions", "estimates")
 FIELDS = {
     *("path", "kind", "item", "unit", "words", "spoken_unit", "least", "above", "most", "default", "required"),
-    *("absent", "fixed", "option", "keys", "text", "note", "why"),
+    *("absent", "fixed", "option", "keys", "holds", "text", "note", "why"),
 }
 
 

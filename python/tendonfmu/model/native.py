@@ -108,7 +108,7 @@ class Instance:
 
     @property
     def kernel(self) -> str:
-        """Instruction set of the step: "plain", "sse2" or "avx2". All give the same bits."""
+        """Instruction set of the step: "plain", "sse2", "avx2" or "neon". All give the same bits."""
         return self._finger.kernel
 
     @kernel.setter

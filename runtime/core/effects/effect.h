@@ -12,7 +12,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum { EFFECT_MAX_PARAMETERS = 4, EFFECT_ALL_JOINTS = 16 };
+enum { EFFECT_MAX_PARAMETERS = 4 };
 
 #define EFFECT_NOWHERE 0xffffffffu
 
@@ -63,6 +63,22 @@ typedef struct effect_sample {
   const double* axis_cosine;                /* [n × n] of the angle between the axes of two joints; 1 without links */
   double tendon_threshold, joint_threshold; /* v_min: m/s, rad/s */
 } effect_sample;
+
+/* r_ij */
+static inline double arm_at(const effect_sample* sample, size_t joint, size_t tendon) {
+  return sample->moment_arm[joint * sample->lanes + tendon];
+}
+
+/* sign of a velocity where it moves, else the one that was held before; 0 as long as it never moved */
+static inline double held_side(const effect_sample* sample, double velocity, double threshold, const double* before) {
+  if (velocity > threshold) {
+    return 1.0;
+  }
+  if (velocity < -threshold) {
+    return -1.0;
+  }
+  return sample->first ? 0.0 : *before;
+}
 
 /* A direction in the space of what a torque depends on: for derivatives. */
 typedef struct effect_direction {

@@ -2,8 +2,6 @@
 
 #include "effect_facts.h"
 
-#include "effect_parts.h"
-
 /* The true force of a tendon is (1 + correction)·f0: T_j = −correction·r_ij·f0 at every joint. */
 
 static void add_to_joints(effect_place place, const effect_sample* sample, double force, double* torque) {

@@ -2,8 +2,6 @@
 
 #include "effect_facts.h"
 
-#include "effect_parts.h"
-
 /* The true force of a tendon is f0 + correction: T_j = −correction·r_ij at every joint. */
 
 static void torque(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,

@@ -4,8 +4,6 @@
 
 #include <math.h>
 
-#include "effect_parts.h"
-
 /* T_j = coulomb·|f0|·s: Coulomb friction in a joint that grows with the force of one tendon, s the sign of the joint's
  * velocity when it last moved. */
 

@@ -4,8 +4,6 @@
 
 #include <math.h>
 
-#include "effect_parts.h"
-
 /* Friction of a tendon that does not scale with its force (a tight sheath, a seal): before joint j' the tendon loses
  * coulomb·s, s the sign of ẋ_ij' when it last moved, so T_j' = r_ij'·coulomb·s and T_j = beyond·r_ij·coulomb·s for all
  * j > j'. Without a joint, before every joint that the tendon reaches; where no moment arm is left ẋ is 0 and so is s.

@@ -6,29 +6,22 @@
 
 #include "exponential.h"
 #include "processor.h"
-#include "step_kernels.h"
+
+const step_kernel* kernel_choose(const char* name) {
+  const int automatic = strcmp(name, "auto") == 0;
+#if defined(__GNUC__) && defined(__x86_64__)
+  if ((automatic || strcmp(name, step_avx2.name) == 0) && has_avx2()) {
+    return &step_avx2;
+  }
+#endif
+#if defined(__GNUC__) && (defined(__x86_64__) || defined(__aarch64__))
+  if (automatic || strcmp(name, step_vector.name) == 0) {
+    return &step_vector;
+  }
+#endif
+  return automatic || strcmp(name, step_plain.name) == 0 ? &step_plain : NULL;
+}
 
 int kernel_rounds_as_written(void) {
   return rounds_as_written();
 }
-
-#if defined(__x86_64__) || defined(_M_X64)
-
-const step_kernel* kernel_choose(const char* name) {
-  const int automatic = strcmp(name, "auto") == 0;
-  if ((automatic || strcmp(name, "avx2") == 0) && has_avx2()) {
-    return &step_avx2;
-  }
-  if (automatic || strcmp(name, "sse2") == 0) {
-    return &step_sse2;
-  }
-  return strcmp(name, "plain") == 0 ? &step_plain : NULL;
-}
-
-#else
-
-const step_kernel* kernel_choose(const char* name) {
-  return strcmp(name, "auto") == 0 || strcmp(name, "plain") == 0 ? &step_plain : NULL;
-}
-
-#endif

@@ -3,13 +3,24 @@
 
 #include "finger_memory.h"
 
-typedef enum sample_result { SAMPLE_TAKEN, SAMPLE_OUT_OF_RANGE, SAMPLE_OVERFLOWS } sample_result;
-
+/* What of a sample is computed on lanes side by side. */
 struct step_kernel {
   const char* name;
-  /* Takes the sample whose inputs stand in scratch; unless SAMPLE_TAKEN is returned, nothing is remembered. */
-  sample_result (*take_sample)(tendonfmu_finger* finger, double time);
+  /* product [N] of a matrix [n × M] and x [M] */
+  void (*multiply)(const tendonfmu_finger* finger, const double* matrix, const double* x, double* product);
+  /* eq. (5), from the joint velocities in the last row of velocity [n × M + N] */
+  void (*tendon_velocities)(const tendonfmu_finger* finger, double* velocity);
+  /* F of every slot, forces, and T of eq. (10), in scratch; returns whether any slot comes to rest or begins to move */
+  int (*find_friction)(tendonfmu_finger* finger);
+  /* Fig. 5 for every slot, after its transitions: the side of what moves, the time of what rests */
+  void (*remember_slots)(tendonfmu_finger* finger, double time);
+  /* and in contact: what rests counts as having come to rest just now */
+  void (*restart_rests)(tendonfmu_finger* finger, double time);
 };
+
+extern const step_kernel step_plain;
+extern const step_kernel step_vector; /* this and the next where compiler and processor have vectors */
+extern const step_kernel step_avx2;
 
 /* The fastest kernel that processor and operating system allow ("auto"), or the one of that name; NULL where it cannot
  * run or is not built in. */

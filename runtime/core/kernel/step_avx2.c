@@ -2,24 +2,23 @@
  * sees to it that the code is only entered where it can run. */
 #include "floating_point.h"
 
-#if defined(__x86_64__) || defined(_M_X64)
+#if defined(__GNUC__) && defined(__x86_64__)
 
 #if defined(__clang__)
 #pragma clang attribute push(__attribute__((target("avx2"))), apply_to = function)
-#elif defined(__GNUC__)
+#else
 #pragma GCC push_options
 #pragma GCC target("avx2")
 #endif
 
-#define TENDONFMU_QUAD_AVX2
+#define TENDONFMU_QUAD_LANES 4
 #include "step_kernel.h"
-#include "step_kernels.h"
 
-const step_kernel step_avx2 = {"avx2", take_sample};
+const step_kernel step_avx2 = STEP_KERNEL("avx2");
 
 #if defined(__clang__)
 #pragma clang attribute pop
-#elif defined(__GNUC__)
+#else
 #pragma GCC pop_options
 #endif
 

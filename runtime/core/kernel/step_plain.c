@@ -2,6 +2,5 @@
 #include "floating_point.h"
 
 #include "step_kernel.h"
-#include "step_kernels.h"
 
-const step_kernel step_plain = {"plain", take_sample};
+const step_kernel step_plain = STEP_KERNEL("plain");

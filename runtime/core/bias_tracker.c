@@ -1,0 +1,223 @@
+#include "floating_point.h"
+
+#include "bias_tracker.h"
+
+#include <math.h>
+
+#include "extensions.h"
+#include "kernel_choice.h"
+#include "slot_view.h"
+
+/* --- jumps ----------------------------------------------------------------------------------------------------------
+ */
+
+/* A slot at a transition. */
+typedef struct transition {
+  int stops, starts;
+  double side_before; /* s1 = sgn(v) of the last moving sample, 0: never moved */
+  double side_now;    /* s2 = sgn(v) */
+  double kept;        /* exp(−forget_rate·(last_stuck − stuck_since)) */
+  double threshold;   /* v_min */
+} transition;
+
+static double threshold_of(const tendonfmu_finger* f, size_t slot) {
+  const finger_settings* settings = &f->derived.settings;
+  return slot < f->joints * f->tendon_lanes ? settings->tendon_threshold : settings->joint_threshold;
+}
+
+static int moves_now(const tendonfmu_finger* f, size_t slot) {
+  return fabs(f->scratch.velocity[slot]) > threshold_of(f, slot);
+}
+
+/* the exponent of forgetting: what time or the filter has taken from a slot's torque since it came to rest */
+static double forgotten(const tendonfmu_finger* f, size_t slot) {
+  const finger_state* s = &f->remembered;
+  const double since = s->stuck_since[slot];
+  return f->derived.settings.forgets_by_absorption ? s->scalar[STATE_ABSORBED] - since
+                                                   : f->derived.settings.forget_rate * (s->last_stuck[slot] - since);
+}
+
+static transition transition_at(const tendonfmu_finger* f, size_t slot) {
+  const int now = moves_now(f, slot), before = f->remembered.moving[slot] > 0.5;
+  return (transition){.stops = before && !now,
+                      .starts = now && !before,
+                      .side_before = f->remembered.side[slot],
+                      .side_now = copysign(1.0, f->scratch.velocity[slot]),
+                      .kept = now && !before ? law_exponential(forgotten(f, slot)) : 0.0,
+                      .threshold = threshold_of(f, slot)};
+}
+
+/* |F| of an effect at v_min, on the side for v > 0 or v < 0 */
+static double magnitude(const effect_laws* laws, double side, double threshold) {
+  const size_t offset = side < 0.0 ? LAW_SIDE_NUMBERS : 0;
+  const double below = law_with_slopes(laws->below + offset, threshold).value;
+  if (!laws->above) {
+    return below;
+  }
+  return below + laws->weight * (law_with_slopes(laws->above + offset, threshold).value - below);
+}
+
+/* b of fig. 5 */
+static double jump(const transition* t, const effect_laws* laws) {
+  if (!t->stops && !t->starts) {
+    return 0.0;
+  }
+  const double before = t->side_before * magnitude(laws, t->side_before, t->threshold); /* 0 where it never moved */
+  if (t->stops) {
+    return before;
+  }
+  const double now = t->side_now * magnitude(laws, t->side_now, t->threshold);
+  const double remembered = fabs(t->side_before) > 0.5 ? (before - now) * t->kept : 0.0;
+  return 0.0 - now - remembered;
+}
+
+static void jump_tendon(tendonfmu_finger* f, size_t joint, size_t tendon) {
+  const size_t slot = joint * f->tendon_lanes + tendon;
+  const transition t = transition_at(f, slot);
+  f->scratch.edge_bias[slot] = f->scratch.pulley_bias[slot] = 0.0;
+  if (!t.stops && !t.starts) {
+    return;
+  }
+  const effect_laws edge = edge_laws(f, joint, tendon, joint ? f->scratch.angle[joint - 1] : 0.0, 0.0);
+  const effect_laws pulley = {.below = f->derived.pulley_law + slot * LAW_NUMBERS};
+  f->scratch.edge_bias[slot] = jump(&t, &edge);
+  f->scratch.pulley_bias[slot] = jump(&t, &pulley);
+}
+
+static void jump_joint(tendonfmu_finger* f, size_t joint) {
+  const transition t = transition_at(f, f->joints * f->tendon_lanes + joint);
+  const effect_laws own = {.below = f->derived.joint_law + joint * LAW_NUMBERS};
+  const effect_laws load = {.below = f->derived.load_law + joint * LAW_NUMBERS};
+  f->scratch.joint_bias[joint] = jump(&t, &own);
+  f->scratch.load_bias[joint] = jump(&t, &load);
+}
+
+/* Δb_j: eq. (10) with the b in place of the F, at the forces already propagated */
+static void sum_jumps(tendonfmu_finger* f) {
+  const finger_scratch* s = &f->scratch;
+  const size_t n = f->joints, lanes = f->tendon_lanes;
+  double steps[MODEL_MAX_JOINTS][4] = {{0.0}};
+  for (size_t i = 0; i < lanes; ++i) {
+    double sum = 0.0;
+    for (size_t j = 0; j < n; ++j) {
+      const size_t at = j * lanes + i;
+      sum += s->force_at[at] * s->edge_bias[at];
+      sum += j + 1 < n ? s->force_between[at] * s->pulley_bias[at + lanes] : 0.0;
+      steps[j][i % 4] += f->derived.moment_arm[at] * sum;
+    }
+  }
+  for (size_t j = 0; j < n; ++j) {
+    s->bias_step[j] = sum_of_lanes(steps[j]) + (s->joint_bias[j] + s->load_bias[j] * s->load[j]);
+  }
+}
+
+void find_bias_steps(tendonfmu_finger* f) {
+  for (size_t slot = 0; slot < f->joints * f->tendon_lanes; ++slot) {
+    jump_tendon(f, slot / f->tendon_lanes, slot % f->tendon_lanes);
+  }
+  for (size_t j = 0; j < f->joint_lanes; ++j) {
+    jump_joint(f, j);
+  }
+  if (f->extensions.gripped) {
+    grip_jumps(f);
+  }
+  sum_jumps(f);
+}
+
+void remember_transitions(tendonfmu_finger* f, double time) {
+  const finger_state* s = &f->remembered;
+  const double clock = f->derived.settings.forgets_by_absorption ? s->scalar[STATE_ABSORBED] : time;
+  for (size_t slot = 0; slot < f->slots; ++slot) {
+    const int now = moves_now(f, slot), before = s->moving[slot] > 0.5;
+    s->event[slot] = now && !before ? s->side[slot] - 2.0 : before && !now ? 1.0 : 0.0;
+    s->stuck_since[slot] = before && !now ? clock : s->stuck_since[slot];
+    s->moving[slot] = now;
+  }
+}
+
+void hold_bias(tendonfmu_finger* f, double time) {
+  clear_lanes(f->remembered.gain, f->joint_lanes);
+  if (!f->derived.settings.forgets_by_absorption) {
+    f->kernel->restart_rests(f, time);
+  }
+}
+
+/* --- the filter -----------------------------------------------------------------------------------------------------
+ */
+
+/* variance of the noise on the torque at this mean tendon force, (N·m)² */
+static double noise_variance(const finger_settings* settings, double mean_force, double scale) {
+  const double noise = settings->noise_std + settings->noise_std_per_force * mean_force;
+  return noise * noise * scale;
+}
+
+double noise_of_step(const tendonfmu_finger* f, double step, double mean_force) {
+  const finger_settings* settings = &f->derived.settings;
+  const double wanted = settings->noise_time >= 0.0 ? settings->noise_time / step : 1.0;
+  const double scale = wanted < 1e300 ? wanted : 1e300; /* finite, however short the step */
+  return noise_variance(settings, mean_force, scale);
+}
+
+void begin_bias(tendonfmu_finger* f, double mean_force) {
+  const finger_state* s = &f->remembered;
+  const finger_settings* settings = &f->derived.settings;
+  const double variance =
+      settings->initial_variance >= 0.0 ? settings->initial_variance : noise_variance(settings, mean_force, 1.0);
+  for (size_t j = 0; j < f->joints; ++j) {
+    s->bias[j] = settings->has_initial_torque ? f->derived.initial_torque[j] : s->torque[j] - f->scratch.friction[j];
+    s->variance[j] = variance;
+    s->gain[j] = 0.0;
+    /* without a given torque the same to the last bit */
+    s->friction[j] = settings->has_initial_torque ? s->bias[j] + f->scratch.friction[j] : s->torque[j];
+  }
+}
+
+void predict_residual(tendonfmu_finger* f, double step, double noise) {
+  const finger_state* s = &f->remembered;
+  const double drift = f->derived.settings.drift_variance * step;
+  for (size_t j = 0; j < f->joint_lanes; ++j) {
+    f->scratch.residual_variance[j] = s->variance[j] + drift + noise;
+    if (!f->guide.learns) {
+      s->variance[j] += drift;
+      s->gain[j] = 0.0;
+    }
+  }
+}
+
+/* K, 0 where nothing is known to be uncertain */
+static double kalman_gain(double predicted, double noise) {
+  const double total = predicted + noise;
+  return total > 0.0 ? predicted / total : 0.0;
+}
+
+/* K with the variance of friction whose state nobody knows beside P⁻: it is distributed evenly */
+static double gain_of_joint(const tendonfmu_finger* f, size_t j, double predicted, double noise, double gain) {
+  if (!f->derived.settings.has_bands || f->guide.guides) {
+    return gain;
+  }
+  const double unknown = f->scratch.unknown[j];
+  return kalman_gain(predicted + unknown * unknown * (1.0 / 3.0), noise);
+}
+
+/* Λ: what the filter absorbs */
+static void count_absorbed(tendonfmu_finger* f, double left) {
+  const double absorbed = left > 0.0 ? -law_logarithm(left) : 700.0;
+  f->remembered.scalar[STATE_ABSORBED] += absorbed < 700.0 ? absorbed : 700.0;
+}
+
+void track_bias(tendonfmu_finger* f, double step, double noise) {
+  const finger_state* s = &f->remembered;
+  const double drift = f->derived.settings.drift_variance * step;
+  double left = 1.0; /* without what is unknown the same at all joints */
+  for (size_t j = 0; j < f->joint_lanes; ++j) {
+    const double predicted = s->variance[j] + drift, gain = kalman_gain(predicted, noise);
+    s->gain[j] = gain_of_joint(f, j, predicted, noise, gain);
+    s->bias[j] += s->gain[j] * s->residual[j];
+    s->friction[j] += s->gain[j] * s->residual[j];
+    s->variance[j] = (1.0 - gain) * predicted;
+    left = j ? left : 1.0 - gain;
+  }
+  if (f->derived.settings.forgets_by_absorption) {
+    count_absorbed(f, left);
+  }
+}

@@ -1,0 +1,16 @@
+/* exp(−x) of the kernel on vectors of two as a function, for exponential_test.cpp. */
+#include "floating_point.h"
+
+#if defined(__GNUC__) && (defined(__x86_64__) || defined(__aarch64__))
+
+#define TENDONFMU_QUAD_LANES 2
+#include "exponential.h"
+#include "exponential_kernels.h"
+
+void exponential_vector(const double* x, double* result, size_t count) {
+  for (size_t i = 0; i < count; i += QUAD_LANES) {
+    quad_store(result + i, exp_of_minus(quad_load(x + i)));
+  }
+}
+
+#endif
