@@ -115,7 +115,7 @@ def smooth() -> dict[str, Any]:
 
 @pytest.mark.parametrize("seed", repeated([6, 12, 17, 20, 21, 26, 35], 0, 1, 2))
 def test_tolerances_agree_on_random_fingers(seed: int) -> None:
-    """Slack, stops, pushes, obstacles, wrists, every friction switch: a tight and a rough tolerance, and their energy balances."""
+    """Slack, stops, pushes, obstacles, wrists, every friction switch: a tight and a rough tolerance, energies kept."""
     rig, time = random_plant(seed) | {"settle": 1.0}, grid(2.0, 5e-3)
     tight = run(rig, time, relative_tolerance=1e-7)
     rough = run(rig, time, relative_tolerance=1e-5)
