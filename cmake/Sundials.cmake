@@ -50,30 +50,13 @@ function(tendonfmu_check_sundials)
   set(problem "" PARENT_SCOPE)
 endfunction()
 
-# For a linker without --wrap (zig's): sets `result` to a copy of the archive that calls __wrap_pow for pow.
-function(tendonfmu_rename_pow library result)
-  get_filename_component(name "${library}" NAME)
-  set(copy "${PROJECT_BINARY_DIR}/sundials_renamed/${name}")
-  file(MAKE_DIRECTORY "${PROJECT_BINARY_DIR}/sundials_renamed")
-  execute_process(COMMAND "${CMAKE_OBJCOPY}" --redefine-sym pow=__wrap_pow "${library}" "${copy}"
-                  RESULT_VARIABLE code ERROR_VARIABLE output)
-  if(NOT code EQUAL 0)
-    message(FATAL_ERROR "The linker has no --wrap, and objcopy could not rename pow in ${library}: ${code} ${output}")
-  endif()
-  set(${result} "${copy}" PARENT_SCOPE)
-endfunction()
-
 # The target for what FindSUNDIALS found. cmake/InstallLibrary.cmake puts copies of the archives beside an installed library.
 function(tendonfmu_add_sundials_target)
   add_library(tendonfmu_sundials INTERFACE)
   target_include_directories(tendonfmu_sundials SYSTEM INTERFACE "$<BUILD_INTERFACE:${SUNDIALS_INCLUDE_DIR}>")
-  check_linker_flag(C "LINKER:--wrap=pow" TENDONFMU_LINKER_WRAPS)
   set(names "")
   foreach(library IN LISTS SUNDIALS_LIBRARIES)
     get_filename_component(name "${library}" NAME)
-    if(NOT TENDONFMU_LINKER_WRAPS AND CMAKE_SYSTEM_NAME STREQUAL "Linux")
-      tendonfmu_rename_pow("${library}" library)
-    endif()
     list(APPEND names "${name}")
     target_link_libraries(tendonfmu_sundials INTERFACE
       "$<BUILD_INTERFACE:${library}>" "$<INSTALL_INTERFACE:$<INSTALL_PREFIX>/${CMAKE_INSTALL_LIBDIR}/tendonfmu/${name}>")
@@ -86,13 +69,6 @@ function(tendonfmu_add_sundials_target)
   check_linker_flag(C "LINKER:--exclude-libs,${names}" TENDONFMU_LINKER_HIDES_LIBRARIES)
   if(TENDONFMU_LINKER_HIDES_LIBRARIES)
     target_link_options(tendonfmu_sundials INTERFACE "LINKER:--exclude-libs,${names}")
-  endif()
-
-  # CVODE takes its step sizes by pow(), whose last bit in the C library depends on the processor (fused multiply-add):
-  # runtime/plant/cvode_integrator.cpp has one that is the same everywhere. Not for who links the installed library: his own pow() would
-  # be taken as well.
-  if(TENDONFMU_LINKER_WRAPS)
-    target_link_options(tendonfmu_sundials INTERFACE "$<BUILD_INTERFACE:LINKER:--wrap=pow>")
   endif()
 endfunction()
 

@@ -27,6 +27,18 @@ int pthread_once(pthread_once_t* once, void (*routine)(void)) {
   return 0;
 }
 
+/* pow() of CVODE got a new version in 2.29, as log() did (of_c.c). */
+#ifdef __x86_64__
+__asm__(".symver oldest_pow,pow@GLIBC_2.2.5");
+#else
+__asm__(".symver oldest_pow,pow@GLIBC_2.17");
+#endif
+double oldest_pow(double base, double exponent);
+double pow(double base, double exponent);
+double pow(double base, double exponent) {
+  return oldest_pow(base, exponent);
+}
+
 /* glibc 2.38: the names that C++ calls strtol() and so on by. They take binary numbers too, which JSON does not have.
  * C11 knows the old names alone. */
 /* NOLINTBEGIN(bugprone-reserved-identifier,readability-identifier-naming): glibc's names */

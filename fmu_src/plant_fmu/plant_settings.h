@@ -8,9 +8,7 @@
 
 /* Those of one number: name in the table's groups and here, field of the plant's settings, its type. */
 #define SETTINGS(ENTRY)                                 \
-  ENTRY(INTEGRATOR, integrator, int)                    \
   ENTRY(RELATIVE_TOLERANCE, relative_tolerance, double) \
-  ENTRY(STEP, step, double)                             \
   ENTRY(SCHEDULED_MOTION, scheduled_motion, int)        \
   ENTRY(SCHEDULED_PUSHES, scheduled_pushes, int)        \
   ENTRY(SENSORS, sensors, int)                          \

@@ -76,14 +76,12 @@ class bound_plant : bound_handle<tendonfmu_plant, tendonfmu_plant_destroy, tendo
   nb::tuple settings() const {
     tendonfmu_plant_settings s;
     check(tendonfmu_plant_get_settings(get(), &s));
-    return nb::make_tuple(s.integrator, s.relative_tolerance, s.step, s.scheduled_motion != 0, s.scheduled_pushes != 0,
-                          s.sensors != 0, s.seed,
-                          std::array<double, 3>{s.push_point[0], s.push_point[1], s.push_point[2]}, s.push_link);
+    return nb::make_tuple(s.relative_tolerance, s.scheduled_motion != 0, s.scheduled_pushes != 0, s.sensors != 0,
+                          s.seed, nb::make_tuple(s.push_point[0], s.push_point[1], s.push_point[2]), s.push_link);
   }
-  void set_settings(int integrator, double tolerance, double step, bool motion, bool pushes, bool sensors,
-                    std::uint64_t seed, const std::array<double, 3>& point, int link) {
-    const tendonfmu_plant_settings s = {
-        integrator, tolerance, step, motion, pushes, sensors, seed, {point[0], point[1], point[2]}, link};
+  void set_settings(double tolerance, bool motion, bool pushes, bool sensors, std::uint64_t seed,
+                    const std::array<double, 3>& point, int link) {
+    const tendonfmu_plant_settings s = {tolerance, motion, pushes, sensors, seed, {point[0], point[1], point[2]}, link};
     check(tendonfmu_plant_set_settings(get(), &s));
   }
   void set_inputs(const std::optional<std::vector<double>>& command, double pretension,

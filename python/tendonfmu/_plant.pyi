@@ -18,12 +18,10 @@ class Plant:
     def time(self) -> float: ...
     @property
     def initialised(self) -> bool: ...
-    def settings(self) -> tuple[int, float, float, bool, bool, bool, int, list[float], int]: ...
+    def settings(self) -> tuple[float, bool, bool, bool, int, tuple[float, float, float], int]: ...
     def set_settings(
         self,
-        integrator: int,
         relative_tolerance: float,
-        step: float,
         scheduled_motion: bool,
         scheduled_pushes: bool,
         sensors: bool,

@@ -286,8 +286,8 @@ class PlantCalls(Calls):
     extremes = (0.0, -0.0)
     tunable = ()
     related = ()
-    fixed = ("step", 1e-5, 1e-3)
-    setting = ("integrator", 2)
+    fixed = ("relative_tolerance", 1e-6, 1e-4)
+    setting = ("push_link", 2)
     bad = (*NO_NUMBERS, 1e5)
     steps = (1e-9, 1e-5, 1e-3, 1 / 60, 0.02)
     samples_at_the_start_of_a_step = False

@@ -114,16 +114,16 @@ def smooth() -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("seed", repeated([6, 12, 17, 20, 21, 26, 35], 0, 1, 2))
-def test_integrators_agree_on_random_fingers(seed: int) -> None:
-    """Slack, stops, pushes, obstacles, wrists, every friction switch: both integrators, and their energy balances."""
+def test_tolerances_agree_on_random_fingers(seed: int) -> None:
+    """Slack, stops, pushes, obstacles, wrists, every friction switch: a tight and a rough tolerance, energies kept."""
     rig, time = random_plant(seed) | {"settle": 1.0}, grid(2.0, 5e-3)
-    variable = run(rig, time, relative_tolerance=1e-7)
-    fixed = run(rig, time, integrator="fixed_step", step=2.5e-4)
-    np.testing.assert_allclose(fixed["joint_position"], variable["joint_position"], atol=1e-4)
-    np.testing.assert_allclose(fixed["tendon_force"], variable["tendon_force"], atol=5e-3)
-    for found in (variable, fixed):
+    tight = run(rig, time, relative_tolerance=1e-7)
+    rough = run(rig, time, relative_tolerance=1e-5)
+    np.testing.assert_allclose(rough["joint_position"], tight["joint_position"], atol=1e-3)
+    np.testing.assert_allclose(rough["tendon_force"], tight["tendon_force"], atol=5e-2)
+    for found, tolerance in ((tight, 1e-5), (rough, 1e-3)):
         works = np.ptp(found["energy"], axis=0)[2:].sum()
-        assert np.ptp(balance(found["energy"])) < 1e-5 * works
+        assert np.ptp(balance(found["energy"])) < tolerance * works
 
 
 def test_cvode_error_falls_with_its_tolerance() -> None:

@@ -402,14 +402,14 @@ def test_pushes() -> None:
 
 
 @pytest.mark.parametrize("length", [5e-3, 2e-4, 2e-5])
-@pytest.mark.parametrize("integrator", ["cvode", "fixed_step"])
-def test_short_pushes_are_not_stepped_over(integrator: str, length: float) -> None:
+@pytest.mark.parametrize("tolerance", [1e-8, 1e-4])
+def test_short_pushes_are_not_stepped_over(tolerance: float, length: float) -> None:
     """A finger at rest is integrated in long steps. The impulse F (rise/2 + hold + fall/2) at 40 mm turns the joint of
     2e-6 + 0.01·0.02² kg·m² before its tendons, at 74 Hz and damped, have moved."""
     push = {"start": 0.3, "rise": 0.25 * length, "hold": 0.5 * length, "fall": 0.25 * length, "force": 1.0}
     where = {"direction": [0.0, 0.0, -1.0], "frame": "base", "point": [0.04, 0.0, 0.0]}
     rig = calm(small_rig(pushes=[push | where]))
-    found = run(rig, np.array([0.3 + length, 0.6]), integrator=integrator)
+    found = run(rig, np.array([0.3 + length, 0.6]), relative_tolerance=tolerance)
     assert found["energy"][1, 5] > 0.0
     if length < 1e-4:
         assert found["joint_velocity"][0, 0] == pytest.approx(0.04 * 0.75 * length / 6e-6, rel=0.05)

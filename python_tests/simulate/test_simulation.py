@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 from command import Call
@@ -38,9 +39,9 @@ def short_rig(**changes: Any) -> dict[str, Any]:
 
 
 def solver_failure() -> dict[str, Any]:
-    """10 kN on a fingertip of 4 g, within one step of 10 ms: the fixed-step integrator finds no end of it."""
+    """10 kN on a lever of 10 m at a fingertip of 4 g: beyond the acceleration that counts as a motion."""
     push = {"start": 0.5, "rise": 0.01, "hold": 0.3, "fall": 0.1, "force": 1e4, "direction": [0.0, 0.0, 1.0]}
-    return short_rig(integration={"method": "fixed_step", "step": 1e-2}, pushes=[push])
+    return short_rig(pushes=[push | {"point": [10.0, 0.0, 0.0]}])
 
 
 def simulated(folder: Path, data: dict[str, Any], **options: Any) -> Simulation:
@@ -116,23 +117,26 @@ def test_the_truth_is_whole_and_consistent(result: Simulation) -> None:
 @pytest.mark.long
 @pytest.mark.skipif(
     not sys.platform.startswith("linux") or platform.machine() != "x86_64",
-    reason="SAME BYTES ON ANOTHER PROCESSOR NOT TESTED: the C library of x86-64 Linux can be told to do without FMA",
+    reason="SAME NUMBERS ON ANOTHER PROCESSOR NOT TESTED: the C library of x86-64 Linux can be told to do without FMA",
 )
-@pytest.mark.parametrize("integrator", repeated(["cvode", "fixed_step"], 0))
-def test_the_processor_does_not_show(integrator: str, tmp_path: Path) -> None:
-    """The C library's functions differ in the last bit between processors with and without fused multiply-add."""
+@pytest.mark.parametrize("tolerance", repeated([1e-6, 1e-4], 0))
+def test_the_processor_shows_within_the_tolerance_only(tolerance: float, tmp_path: Path) -> None:
+    """CVODE takes its step sizes by pow(), whose last bit differs between processors with and without fused
+    multiply-add."""
+    rig = short_rig(integration={"relative_tolerance": tolerance})
     for name, environment in {"with": {}, "without": {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4"}}.items():
-        command = [sys.executable, "-m", "tendonfmu.cli", "simulate", str(written(tmp_path, short_rig()))]
+        command = [sys.executable, "-m", "tendonfmu.cli", "simulate", str(written(tmp_path, rig))]
         files = ["-o", f"{name}.parquet", "--truth", f"{name}_truth.parquet"]
         subprocess.run(
-            [*command, *files, "--integrator", integrator],
+            [*command, *files],
             cwd=tmp_path,
             env=os.environ | environment,
             check=True,
             capture_output=True,
         )
-    for file in (".parquet", "_truth.parquet"):
-        assert (tmp_path / f"with{file}").read_bytes() == (tmp_path / f"without{file}").read_bytes()
+    tables = [pq.read_table(tmp_path / f"{name}_truth.parquet").to_pydict() for name in ("with", "without")]
+    for name, bound in (("joint_position", 100.0 * tolerance), ("tendon_force", 500.0 * tolerance)):  # rad, N
+        np.testing.assert_allclose(*(group(table, name) for table in tables), atol=bound)
 
 
 # --- failure ----------------------------------------------------------------------------------------------------------
@@ -152,7 +156,7 @@ def test_a_solver_failure_leaves_no_file(call: Call, tmp_path: Path) -> None:
 def test_the_binding_tells_solver_failures_from_bad_calls(tmp_path: Path) -> None:
     plant = Plant(read_rig(written(tmp_path, solver_failure())).json())
     plant.initialise()
-    with pytest.raises(SolverError, match=r"at t = 0\.5\d* s .*try"):
+    with pytest.raises(SolverError, match=r"at t = 0\.\d+ s .*try"):
         plant.advance(2.0)
     assert plant.time == 0.0  # where it stood
     fresh = Plant(read_rig(written(tmp_path, short_rig())).json())
@@ -189,7 +193,6 @@ def test_bad_usage_is_refused_before_anything_runs(call: Call, tmp_path: Path) -
         ("-o rec.txt", "rec.txt: unknown format '.txt'; expected .csv, .parquet or .mcap"),
         ("-o none/rec.csv", "none/rec.csv: no folder none; expected one that exists"),
         ("-o rec.csv --truth rec.csv", "rec.csv: the same file for recording and truth; expected two names"),
-        ("-o rec.csv --integrator euler", "--integrator euler: expected cvode or fixed_step"),
     ):
         answer = call("simulate", rig, *arguments.split())
         assert (answer.status, answer.err) == (2, f"tendonfmu: {line}\n")
@@ -218,18 +221,16 @@ def plant(tmp_path: Path) -> Plant:
 
 def test_settings_read_back_and_are_checked(plant: Plant) -> None:
     before = plant.settings
-    assert (before.integrator, before.relative_tolerance, before.seed, before.push_link) == ("cvode", 1e-6, 1, 4)
-    plant.configure(integrator="fixed_step", step=1e-4, seed=2**53, push_point=(0.0, 0.0, 0.01), push_link=2)
+    assert (before.relative_tolerance, before.seed, before.push_link) == (1e-6, 1, 4)
+    plant.configure(relative_tolerance=1e-4, seed=2**53, push_point=(0.0, 0.0, 0.01), push_link=2)
     after = plant.settings
-    assert (after.integrator, after.step, after.seed) == ("fixed_step", 1e-4, 2**53)
+    assert (after.relative_tolerance, after.seed) == (1e-4, 2**53)
     assert (after.push_point, after.push_link) == ((0.0, 0.0, 0.01), 2)
-    with pytest.raises(PlantError, match="integrator = 'euler': expected cvode or fixed_step"):
-        plant.configure(integrator="euler")
     with pytest.raises(PlantError):
         plant.configure(push_link=9)
     plant.initialise()
     with pytest.raises(PlantError):
-        plant.configure(step=1e-3)
+        plant.configure(relative_tolerance=1e-3)
 
 
 def test_signals_have_their_shapes(plant: Plant) -> None:

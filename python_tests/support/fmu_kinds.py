@@ -95,7 +95,7 @@ def friction_kind(fmu: UnpackedFmu) -> Kind:
 
 
 def plant_kind(fmu: UnpackedFmu) -> Kind:
-    return Kind(fmu, {"push_force[3]": 0.3, "pretension": 1.0}, _advance_plant, "integrator", has_derivatives=False)
+    return Kind(fmu, {"push_force[3]": 0.3, "pretension": 1.0}, _advance_plant, "push_link", has_derivatives=False)
 
 
 # name of the kind: fixture of its FMU, and what makes the kind of it

@@ -36,7 +36,7 @@ def fmu_rig(**changes: Any) -> dict[str, Any]:
         pushes=[PUSH],
         settle=0.3,
         seed=SEED,
-        integration={"method": "cvode", "relative_tolerance": TOLERANCE},
+        integration={"relative_tolerance": TOLERANCE},
         recording={"duration": DURATION},
     )
     motion = {"kind": "strokes", "seed": 1, "duration": DURATION, "still": 0.02, "speed": [1.0, 3.0]}

@@ -105,7 +105,7 @@ def small_rig(
         "motion": {"pretension": {"time": [0.0], "value": [pretension]}} | (motion or still([0.0] * n)),
         "pushes": [],
         "settle": 1.0,
-        "integration": {"method": "cvode", "relative_tolerance": 1e-8},
+        "integration": {"relative_tolerance": 1e-8},
         "recording": {"duration": 1.0},
     }
     return rig | {key: value for key, value in other.items() if key in own}

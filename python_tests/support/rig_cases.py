@@ -33,7 +33,6 @@ def with_everything() -> dict[str, Any]:
     data["recording"] = {"duration": 20.0, "columns": ["joint_position", "external_torque", "contact"]}
     data["sensors"]["tendon_position"] = {"resolution": 2e-6}
     data["settle"] = 1.0
-    data["integration"]["step"] = 2e-4
     data["physics"] |= everything_of_physics(data["physics"])
     for name, sensor in data["sensors"].items():
         if name != "rate":

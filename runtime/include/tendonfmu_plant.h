@@ -28,11 +28,6 @@ typedef enum tendonfmu_plant_status {
   TENDONFMU_PLANT_SOLVER = 5        /* the integrator gave up: time, cause, what to try */
 } tendonfmu_plant_status;
 
-typedef enum tendonfmu_plant_integrator {
-  TENDONFMU_PLANT_CVODE = 1,     /* variable-step BDF, with root finding */
-  TENDONFMU_PLANT_FIXED_STEP = 2 /* linearly implicit Runge-Kutta method of order 2 */
-} tendonfmu_plant_integrator;
-
 typedef struct tendonfmu_plant tendonfmu_plant;
 
 /* Creates a plant from the text of an expanded rig. Returns NULL when refused, with the reason in message. */
@@ -50,9 +45,7 @@ const char* tendonfmu_plant_last_error(const tendonfmu_plant* plant);
 /* What a plant does by itself. The values the rig gives stand until they are set; all before the initialisation only.
  */
 typedef struct tendonfmu_plant_settings {
-  int integrator;            /* tendonfmu_plant_integrator */
   double relative_tolerance; /* of CVODE, 1e-10..1e-2 */
-  double step;               /* s, of the fixed-step integrator, 1e-6..1e-2 */
   int scheduled_motion;      /* 1: the motors follow the rig's own motion, inputs are added to it; 0: inputs alone */
   int scheduled_pushes;      /* 1: the rig's own pushes act, the push of the inputs beside them */
   int sensors;               /* 1: signals pass the rig's sensors; 0: they are exact */
@@ -123,10 +116,10 @@ tendonfmu_plant_status tendonfmu_plant_get_signals(const tendonfmu_plant* plant,
 tendonfmu_plant_status tendonfmu_plant_run(tendonfmu_plant* plant, size_t samples, const double* time,
                                            const tendonfmu_plant_signals* signals, size_t* done);
 
-/* State at the present time: continuous and discrete states, inputs, sensors, the fixed-step integrator's memory. Two
- * restored runs agree to the bit; with fixed steps also with the uninterrupted one, with CVODE within the tolerances
- * (restoring restarts it: it cannot store its history). Bytes that no such plant could have saved are refused. Saving
- * needs an initialised plant; restoring one of the same rig and settings, initialised or not. */
+/* State at the present time: continuous and discrete states, inputs, sensors. Two restored runs agree to the bit, with
+ * the uninterrupted one within the tolerances (restoring restarts CVODE, which cannot store its history). Bytes that no
+ * such plant could have saved are refused. Saving needs an initialised plant; restoring one of the same rig and
+ * settings, initialised or not. */
 size_t tendonfmu_plant_state_size(const tendonfmu_plant* plant);
 tendonfmu_plant_status tendonfmu_plant_save_state(const tendonfmu_plant* plant, void* bytes, size_t size);
 tendonfmu_plant_status tendonfmu_plant_restore_state(tendonfmu_plant* plant, const void* bytes, size_t size);

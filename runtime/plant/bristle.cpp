@@ -16,7 +16,7 @@ law_columns::law_columns(std::size_t count) {
 }
 
 response_columns::response_columns(std::size_t count) {
-  for (std::vector<double>* column : {&share, &rate, &kept, &share_by_bristle, &share_by_velocity, &share_by_angle,
+  for (std::vector<double>* column : {&share, &rate, &share_by_bristle, &share_by_velocity, &share_by_angle,
                                       &share_by_level, &rate_by_bristle, &rate_by_velocity, &rate_by_angle}) {
     column->assign(padded(count), 0.0);
   }
@@ -49,9 +49,9 @@ inline __attribute__((always_inline)) void store(const pair& values, std::size_t
 }
 
 /* Rows k and k + 1. What is not asked for is left out when this is compiled. */
-template <bool with_span, bool with_slopes>
+template <bool with_slopes>
 inline __attribute__((always_inline)) void respond_two(const law_columns& law, const response_settings& with,
-                                                       const pair& start, std::size_t k, response_columns* r) {
+                                                       const pair& w, std::size_t k, response_columns* r) {
   const pair zero = {}, one = zero + 1.0;
   const pair v = load(law.velocity, k), inverse_length = load(law.inverse_length, k);
   const pair sign = v < zero ? -one : one, speed = v * sign;
@@ -63,21 +63,13 @@ inline __attribute__((always_inline)) void respond_two(const law_columns& law, c
   const pair level = (load(law.sliding, k) + excess * left) * inverse_c;
   const pair g = rubs ? level : one, inverse_g = 1.0 / g;
 
-  // the bristle, moved on by the span: with a constant velocity it nears sgn(v) ĝ exponentially
-  const pair per_second = speed * inverse_length;
-  const pair travel = per_second * with.span * inverse_g, from_end = start - sign * g;
-  const pair rest = with_span ? exponential(-travel) : one;
-  const pair w = with_span ? sign * g + from_end * rest : start;
-
   // w + T_d(v) w' = w (1 − a/ĝ) + a sgn(v),  a = |v| T_d/d / (1 + |v| T_d/d)
-  const pair bent = w * inverse_g;
+  const pair per_second = speed * inverse_length, bent = w * inverse_g;
   const pair fade = 1.0 / (1.0 + per_second * with.damping_time), a = 1.0 - fade;
   const pair bending = w - a * bent + a * sign;
   const pair strength = with.level * c, viscous = load(law.viscous, k);
   store(strength * bending + viscous * v, k, &r->share);
-  const double frequency = with_span ? 1.0 / with.span : 0.0;
-  store(with_span ? (w - start) * frequency : v * inverse_length - per_second * bent, k, &r->rate);
-  store(rest, k, &r->kept);
+  store(v * inverse_length - per_second * bent, k, &r->rate);
   if (!with_slopes) {
     return;
   }
@@ -88,43 +80,30 @@ inline __attribute__((always_inline)) void respond_two(const law_columns& law, c
   const pair g_by_angle =
       rubs ? (load(law.sliding_by_angle, k) + load(law.excess_by_angle, k) * left - g * c_by_angle) * inverse_c : zero;
   const pair a_by_velocity = sign * with.damping_time * inverse_length * fade * fade;
-  const pair stiffer = a * bent * inverse_g;
+  const pair stiffer = a * bent * inverse_g, turning = per_second * bent * inverse_g;
   store(strength * (1.0 - a * inverse_g), k, &r->share_by_bristle);
   store(strength * (a_by_velocity * (sign - bent) + stiffer * g_by_velocity) + viscous, k, &r->share_by_velocity);
   store(with.level * (c_by_angle * bending + c * stiffer * g_by_angle) + load(law.viscous_by_angle, k) * v, k,
         &r->share_by_angle);
   store(c * bending, k, &r->share_by_level);
-  if (with_span) {
-    const pair by_g = sign * (1.0 - rest) + from_end * rest * travel * inverse_g;
-    const pair by_velocity = from_end * rest * sign * with.span * inverse_length * inverse_g;
-    store(zero, k, &r->rate_by_bristle);
-    store((by_g * g_by_velocity - by_velocity) * frequency, k, &r->rate_by_velocity);
-    store(by_g * g_by_angle * frequency, k, &r->rate_by_angle);
-  } else {
-    const pair turning = per_second * bent * inverse_g;
-    store(-per_second * inverse_g, k, &r->rate_by_bristle);
-    store((1.0 - sign * bent) * inverse_length + turning * g_by_velocity, k, &r->rate_by_velocity);
-    store(turning * g_by_angle, k, &r->rate_by_angle);
-  }
+  store(-per_second * inverse_g, k, &r->rate_by_bristle);
+  store((1.0 - sign * bent) * inverse_length + turning * g_by_velocity, k, &r->rate_by_velocity);
+  store(turning * g_by_angle, k, &r->rate_by_angle);
 }
 
-template <bool with_span, bool with_slopes>
+template <bool with_slopes>
 void respond_all(const law_columns& laws, const response_settings& with, const double* w, response_columns* responses) {
   for (std::size_t k = 0; k < laws.velocity.size(); k += pair_size) {
     pair start;
     std::memcpy(&start, w + k, sizeof start);
-    respond_two<with_span, with_slopes>(laws, with, start, k, responses);
+    respond_two<with_slopes>(laws, with, start, k, responses);
   }
 }
 
 }  // namespace
 
 void respond(const law_columns& laws, const response_settings& with, const double* w, response_columns* responses) {
-  if (with.span > 0.0) {
-    (with.slopes ? respond_all<true, true> : respond_all<true, false>)(laws, with, w, responses);
-  } else {
-    (with.slopes ? respond_all<false, true> : respond_all<false, false>)(laws, with, w, responses);
-  }
+  (with.slopes ? respond_all<true> : respond_all<false>)(laws, with, w, responses);
 }
 
 }  // namespace tendonfmu::plant

@@ -40,7 +40,6 @@ struct law_columns {
  * 1/s and its slopes. Slopes are filled in on request. */
 struct response_columns {
   std::vector<double> share, rate;
-  std::vector<double> kept; /* with a span: what is left of the way to the end of bending */
   std::vector<double> share_by_bristle, share_by_velocity, share_by_angle, share_by_level;
   std::vector<double> rate_by_bristle, rate_by_velocity, rate_by_angle;
 
@@ -51,13 +50,10 @@ struct response_columns {
 struct response_settings {
   double level = 1.0;        /* of all friction but the viscous */
   double damping_time = 0.0; /* T_d, s */
-  double span = 0.0;         /* s, see below */
   bool slopes = true;
 };
 
-/* Responses to bristles w [padded count]. With a span > 0 every bristle first moves on by that time at constant
- * velocity, which is solved exactly; the rates are then such that an implicit step of size `span` moves it, by span ·
- * rate, to just there. */
+/* Responses to bristles w [padded count]. */
 void respond(const law_columns& laws, const response_settings& settings, const double* w, response_columns* responses);
 
 /* Puts a law into row k: velocity v, nothing depends on the angle. */

@@ -123,7 +123,7 @@ void dynamics::bend_bristles(const double* state) {
     set_law(site.friction, speed[site.joint], settings.stribeck_exponent, first + s, &e.laws);
   }
   std::copy(state + layout_.bristle(), state + layout_.heat(), e.bristles.begin());
-  respond(e.laws, {e.level, settings.bristle_damping, span_, slopes_}, e.bristles.data(), &e.responses);
+  respond(e.laws, {e.level, settings.bristle_damping, slopes_}, e.bristles.data(), &e.responses);
   for (std::size_t s = 0; slopes_ && s < first; ++s) {
     if (!rig_.sites[s].bends) {
       e.responses.share_by_angle[s] = e.responses.rate_by_angle[s] = 0.0;
@@ -293,12 +293,9 @@ void dynamics::evaluate(double time, const double* state, const contact_modes* m
   std::copy(speed, speed + n, derivative);
   std::copy(e.acceleration, e.acceleration + n, derivative + layout_.speed());
   double command[max_tendons];
-  if (span_ == 0.0) {
-    command_motors(time, inputs, command);
-  }
+  command_motors(time, inputs, command);
   const double omega = 2.0 * pi * rig_.servo_frequency;
-  // evaluate_after(): the motors have been moved already
-  for (std::size_t i = 0; i < m && span_ == 0.0; ++i) {
+  for (std::size_t i = 0; i < m; ++i) {
     const double motor_speed = state[layout_.motor_speed() + i];
     derivative[layout_.motor() + i] = motor_speed;
     derivative[layout_.motor_speed() + i] =
@@ -312,13 +309,6 @@ void dynamics::evaluate(double time, const double* state, const contact_modes* m
   derivative[layout_.friction_work()] = e.friction_power;
   derivative[layout_.damping_work()] = loss;
   derivative[layout_.push_work()] = e.contact.push_power;
-}
-
-void dynamics::evaluate_after(double span, double time, const double* state, const commands& inputs,
-                              double* derivative) {
-  span_ = span;
-  evaluate(time, state, nullptr, inputs, derivative);
-  span_ = 0.0;
 }
 
 std::size_t dynamics::root_count() const {

@@ -88,9 +88,6 @@ class dynamics {
   void evaluate(double time, const double* state, const contact_modes* modes, const commands& inputs,
                 double* derivative);
 
-  /* The same with every bristle first moved on by `span` at the state's velocity (respond_after): the bristles' rates
-   * are then mean rates over `span`. The motors' derivatives are left out. */
-  void evaluate_after(double span, double time, const double* state, const commands& inputs, double* derivative);
   const evaluation& last() const { return values_; }
 
   /* Where the motors shall be, [m] m. */
@@ -117,7 +114,6 @@ class dynamics {
   const rig& rig_;
   state_layout layout_;
   evaluation values_;
-  double span_ = 0.0; /* of evaluate_after() */
   bool slopes_ = true;
 };
 

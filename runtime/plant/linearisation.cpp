@@ -49,7 +49,7 @@ linearisation::linearisation(const rig& rig)
   }
 }
 
-void linearisation::take(const dynamics& equations, const double* state, const commands& inputs, rigid_slopes rigid) {
+void linearisation::take(const dynamics& equations, const double* state, const commands& inputs) {
   const evaluation& e = equations.last();
   const double* speed = state + layout_.speed();
   mass_ = Eigen::Map<const matrix>(e.mass, n_, n_);
@@ -72,9 +72,7 @@ void linearisation::take(const dynamics& equations, const double* state, const c
   if (e.wrist_speed != 0.0) {
     wrist_slopes(e, speed);
   }
-  if (rigid == rigid_slopes::exact || e.modes.touching) {
-    body_slopes(e, state, inputs, rigid == rigid_slopes::exact);
-  }
+  body_slopes(e, state, inputs);
 }
 
 /* Slopes of the passed torque by what one tendon does. Backward along the tendon: `weight` is the slope of the torque
@@ -271,7 +269,7 @@ void linearisation::wrist_slopes(const evaluation& e, const double* speed) {
 }
 
 /* Rigid bodies, pushes and obstacle, differentiated along angles and speeds in groups of `lanes` directions. */
-void linearisation::body_slopes(const evaluation& e, const double* state, const commands& inputs, bool with_inertia) {
+void linearisation::body_slopes(const evaluation& e, const double* state, const commands& inputs) {
   const std::size_t directions = 2 * n_;
   for (std::size_t first = 0; first < directions; first += lanes) {
     slopes angle[max_joints], speed[max_joints], needed[max_joints];
@@ -289,9 +287,7 @@ void linearisation::body_slopes(const evaluation& e, const double* state, const 
     move_chain(rig_, angle, speed, &motion);
     const contact_torque<slopes> contact =
         contact_torques(rig_, motion, e.time, inputs.scheduled_pushes, inputs.push, e.modes.touching);
-    if (with_inertia) {
-      inverse_dynamics(rig_, motion, speed, e.acceleration, needed);
-    }
+    inverse_dynamics(rig_, motion, speed, e.acceleration, needed);
     for (std::size_t d = first; d < std::min(first + lanes, directions); ++d) {
       const bool is_angle = d < n_;
       const std::size_t column = is_angle ? d : d - n_, lane = d - first;
@@ -370,14 +366,6 @@ void linearisation::solve(double* b) const {
            by_motor_speed_.row(n_).dot(motor_speed) + by_bristle_.row(n_).dot(bristle) + by_heat_[n_] * right[n_]);
   b[layout_.damping_work()] += grown(loss_);
   b[layout_.push_work()] += grown(push_power_);
-}
-
-void linearisation::solve_speeds(double* b) const {
-  Eigen::Map<Eigen::VectorXd> speed(b, n_);
-  small_vector right(n_ + 1);
-  right.head(n_).noalias() = mass_ * speed;
-  right[n_] = 0.0;
-  speed = reduced_.solve(right).head(n_);
 }
 
 void linearisation::dense(double* jacobian) const {

@@ -11,27 +11,18 @@
 
 namespace tendonfmu::plant {
 
-/* How the slopes of the rigid bodies' velocity terms and of the outside forces are taken. */
-enum class rigid_slopes {
-  exact,       /* by duals */
-  contact_only /* only while the obstacle is touched, whose stiffness an implicit step must know; else left out */
-};
-
 class linearisation {
  public:
   explicit linearisation(const rig& rig);
 
   /* Takes the Jacobian at the state that `dynamics` evaluated last. */
-  void take(const dynamics& equations, const double* state, const commands& inputs, rigid_slopes rigid);
+  void take(const dynamics& equations, const double* state, const commands& inputs);
 
   /* Prepares I − γ J. False when it is singular. */
   bool factor(double gamma);
 
   /* Overwrites b [size] by x. */
   void solve(double* b) const;
-
-  /* The same where only the speeds' part of b, [n], is not zero, and only theirs of x is wanted. */
-  void solve_speeds(double* b) const;
 
   /* J, row-major [size × size]. */
   void dense(double* jacobian) const;
@@ -55,7 +46,7 @@ class linearisation {
   void power_row(const evaluation& e, const double* speed);
   void wrist_slopes(const evaluation& e, const double* speed);
   void work_rows(const evaluation& e, const double* state);
-  void body_slopes(const evaluation& e, const double* state, const commands& inputs, bool with_inertia);
+  void body_slopes(const evaluation& e, const double* state, const commands& inputs);
 
   const rig& rig_;
   state_layout layout_;

@@ -3,14 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "cvode_integrator.h"
-#include "fixed_step_integrator.h"
 #include "motion.h"
 
 namespace tendonfmu::plant {
 namespace {
-
-constexpr double largest_input = 1e6;  // m, N: beyond it only a mistake
 
 void need(bool good, const char* line) {
   if (!good) {
@@ -20,9 +16,7 @@ void need(bool good, const char* line) {
 
 tendonfmu_plant_settings settings_of(const rig& rig) {
   tendonfmu_plant_settings settings = {};
-  settings.integrator = rig.integration.method;
-  settings.relative_tolerance = rig.integration.relative_tolerance;
-  settings.step = rig.integration.step;
+  settings.relative_tolerance = rig.relative_tolerance;
   settings.scheduled_motion = settings.scheduled_pushes = settings.sensors = 1;
   settings.seed = rig.seed;
   std::copy(rig.tip.begin(), rig.tip.end(), settings.push_point);
@@ -43,10 +37,7 @@ void plant::set_settings(const tendonfmu_plant_settings& settings) {
     throw refusal(TENDONFMU_PLANT_WRONG_ORDER, "settings: expected before the initialisation only");
   }
   const auto within = [](double x, double low, double high) { return x >= low && x <= high; };
-  need(settings.integrator == TENDONFMU_PLANT_CVODE || settings.integrator == TENDONFMU_PLANT_FIXED_STEP,
-       "integrator: expected 1 (CVODE) or 2 (fixed step)");
   need(within(settings.relative_tolerance, 1e-10, 1e-2), "relative_tolerance: expected a number from 1e-10 to 1e-2");
-  need(within(settings.step, 1e-6, 1e-2), "step: expected a number from 1e-6 to 1e-2 s");
   need(settings.push_link >= 1 && settings.push_link <= static_cast<int>(rig_.joint_count()),
        "push_link: expected the number of a link");
   for (const double x : settings.push_point) {
@@ -83,7 +74,7 @@ void plant::set_inputs(const tendonfmu_plant_inputs& inputs) {
     evaluated_ = false;
   }
   if (changed && integrator_) {
-    integrator_->forget();
+    integrator_->change_inputs();
   }
 }
 
@@ -91,11 +82,7 @@ void plant::make_integrator() {
   if (integrator_) {
     return;
   }
-  if (settings_.integrator == TENDONFMU_PLANT_CVODE) {
-    integrator_ = make_cvode_integrator(&equations_, settings_.relative_tolerance);
-  } else {
-    integrator_ = std::make_unique<fixed_step_integrator>(&equations_, settings_.step);
-  }
+  integrator_ = std::make_unique<integrator>(&equations_, settings_.relative_tolerance);
   inputs_.scheduled_motion = settings_.scheduled_motion != 0;
   inputs_.scheduled_pushes = settings_.scheduled_pushes != 0;
   inputs_.push.link = static_cast<std::size_t>(settings_.push_link) - 1;
@@ -129,7 +116,7 @@ void plant::initialise() {
   start.modes = equations_.modes_at(start.state.data());
   integrator_->forget();
   if (rig_.settle > 0.0) {
-    integrator_->advance(inputs_, 0.0, &start);
+    integrator_->advance(inputs_, 0.0, 0.0, &start);
   }
   start.time = 0.0;
   std::fill(start.state.begin() + static_cast<std::ptrdiff_t>(at.heat()), start.state.end(), 0.0);
@@ -157,13 +144,13 @@ void plant::move_on(double until) {
       break;
     }
     evaluated_ = false;
-    integrator_->advance(inputs_, std::min(next, until), &now_);
+    integrator_->advance(inputs_, std::min(next, until), until, &now_);
     sample();
   }
   if (now_.time < until) {
     evaluated_ = false;
   }
-  integrator_->advance(inputs_, until, &now_);
+  integrator_->advance(inputs_, until, until, &now_);
 }
 
 void plant::advance(double until) {
@@ -329,7 +316,7 @@ void plant::derivative(double time, const double* state, double* result, double*
     return;
   }
   linearisation blocks(rig_);
-  blocks.take(equations_, state, inputs, rigid_slopes::exact);
+  blocks.take(equations_, state, inputs);
   blocks.dense(jacobian);
 }
 

@@ -13,8 +13,9 @@
 
 namespace tendonfmu::plant {
 
-constexpr double same_time = 1e-9;    // s: a sample this little beyond a communication point is taken at it
-constexpr double longest_time = 1e9;  // s
+constexpr double same_time = 1e-9;     // s: a sample this little beyond a communication point is taken at it
+constexpr double longest_time = 1e9;   // s
+constexpr double largest_input = 1e6;  // m, N: beyond it only a mistake
 
 /* A call that cannot be answered; `status` says which kind. */
 struct refusal : std::runtime_error {

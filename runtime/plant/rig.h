@@ -141,11 +141,6 @@ struct sensors {
   sensor tendon_force, tendon_position, joint_position, joint_velocity, external_torque;
 };
 
-struct integration {
-  int method = 1; /* tendonfmu_plant_integrator */
-  double relative_tolerance = 1e-6, step = 1e-3;
-};
-
 struct rig {
   std::string name;
   std::uint64_t seed = 0;
@@ -166,7 +161,7 @@ struct rig {
   knots pretension;          /* N */
   double settle = 2.0;
   plant::sensors sensors;
-  plant::integration integration;
+  double relative_tolerance = 1e-6;
 
   std::size_t joint_count() const { return links.size(); }
   std::size_t tendon_count() const { return tendons.size(); }

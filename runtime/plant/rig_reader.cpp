@@ -48,13 +48,6 @@ json_node physics_of(const json_node& document) {
   return physics;
 }
 
-void read_integration(const json_node& node, rig* rig) {
-  node.expect_keys_if_present({"method", "relative_tolerance", "step"});
-  rig->integration.method = static_cast<int>(choice_in(node, "method", {"cvode", "fixed_step"})) + 1;
-  rig->integration.relative_tolerance = number_in(node, "relative_tolerance", {1e-10, 1e-2, ""}, 1e-6);
-  rig->integration.step = number_in(node, "step", {1e-6, 1e-2, "s"}, 1e-3);
-}
-
 }  // namespace
 
 rig read_rig(const char* text, std::size_t size) {
@@ -78,7 +71,9 @@ rig read_rig(const char* text, std::size_t size) {
   read_motion(document.member("motion"), &rig);
   read_sensors(document.member("sensors"), &rig);
   rig.settle = number_in(document, "settle", {0.0, 1e3, "s"}, 2.0);
-  read_integration(document.member("integration"), &rig);
+  const json_node integration = document.member("integration");
+  integration.expect_keys_if_present({"relative_tolerance"});
+  rig.relative_tolerance = number_in(integration, "relative_tolerance", {1e-10, 1e-2, ""}, 1e-6);
   check_rig(document, &rig);
   return rig;
 }

@@ -9,7 +9,7 @@
 namespace tendonfmu::plant {
 namespace {
 
-constexpr std::uint64_t state_mark = 0x32746e616c704654;  // "TFplant2"
+constexpr std::uint64_t state_mark = 0x33746e616c704654;  // "TFplant3"
 constexpr double beyond_reason = 1e12;                    // of any number, in its unit
 constexpr double largest_motion = 1e5;                    // rad, m, and their speeds: where sine_cosine() ends
 
@@ -30,8 +30,7 @@ struct state_header {
 };
 
 std::uint64_t digest_of(const tendonfmu_plant_settings& s) {
-  return digest({static_cast<double>(s.integrator), s.relative_tolerance, s.step,
-                 static_cast<double>(s.scheduled_motion), static_cast<double>(s.scheduled_pushes),
+  return digest({s.relative_tolerance, static_cast<double>(s.scheduled_motion), static_cast<double>(s.scheduled_pushes),
                  static_cast<double>(s.sensors), static_cast<double>(s.seed >> 32),
                  static_cast<double>(s.seed & 0xffffffffu), s.push_point[0], s.push_point[1], s.push_point[2],
                  static_cast<double>(s.push_link)});
@@ -39,71 +38,64 @@ std::uint64_t digest_of(const tendonfmu_plant_settings& s) {
 
 }  // namespace
 
-/* Everything that is remembered but the integrator's memory: arrays of numbers and of flags, in one order. */
+/* Everything that is remembered: arrays of numbers and of flags, in one order, with the largest that a number may be.
+ */
 template <class Plant, class Visit>
 void plant::visit_state(Plant& plant, Visit visit) {
   const std::size_t n = plant.rig_.joint_count(), m = plant.rig_.tendon_count();
-  visit(&plant.now_.time, 1);
-  visit(&plant.samples_, 1);
-  visit(&plant.inputs_.given, 1);
-  visit(&plant.inputs_.pretension, 1);
-  visit(plant.inputs_.command, m);
-  visit(plant.inputs_.push.force.data(), 3);
-  visit(plant.now_.modes.slack, m);
-  visit(plant.now_.modes.below, n);
-  visit(plant.now_.modes.above, n);
-  visit(&plant.now_.modes.touching, 1);
-  visit(plant.now_.state.data(), plant.now_.state.size());
-  sensor_bank::visit_state(plant.sensors_, visit);
+  const std::size_t motions = plant.equations_.layout().heat();
+  visit(&plant.now_.time, 1, longest_time);
+  visit(&plant.samples_, 1, beyond_reason);
+  visit(&plant.inputs_.given, 1, 1.0);
+  visit(&plant.inputs_.pretension, 1, largest_input);
+  visit(plant.inputs_.command, m, largest_input);
+  visit(plant.inputs_.push.force.data(), 3, largest_input);
+  visit(plant.now_.modes.slack, m, 1.0);
+  visit(plant.now_.modes.below, n, 1.0);
+  visit(plant.now_.modes.above, n, 1.0);
+  visit(&plant.now_.modes.touching, 1, 1.0);
+  visit(plant.now_.state.data(), motions, largest_motion);
+  visit(plant.now_.state.data() + motions, plant.now_.state.size() - motions, beyond_reason);
+  sensor_bank::visit_state(plant.sensors_,
+                           [&](auto* values, std::size_t count) { visit(values, count, beyond_reason); });
 }
 
-/* As numbers of a length that the rig fixes; the integrator's memory last. */
+/* As numbers of a length that the rig fixes. */
 std::vector<double> plant::state_numbers() const {
   std::vector<double> numbers;
-  visit_state(*this,
-              [&](const auto* values, std::size_t count) { numbers.insert(numbers.end(), values, values + count); });
-  const std::size_t memory = numbers.size();
-  numbers.resize(memory + memory_size(equations_.layout()), 0.0);
-  if (integrator_) {
-    integrator_->save_memory(&numbers[memory]);
-  }
+  visit_state(*this, [&](const auto* values, std::size_t count, double) {
+    numbers.insert(numbers.end(), values, values + count);
+  });
   return numbers;
 }
 
 /* Whether a plant of this rig and these settings could have saved them. */
 bool plant::state_is_sound(const std::vector<double>& numbers) const {
-  const auto within = [](const double* first, std::size_t count, double most) {
-    return std::all_of(first, first + count, [most](double x) { return std::fabs(x) <= most; });
-  };
-  bool sound = within(numbers.data(), numbers.size(), beyond_reason);
+  bool sound = true;
   const double* next = numbers.data();
-  const std::size_t motions = equations_.layout().heat();
-  visit_state(*this, [&](const auto* values, std::size_t count) {
-    if (std::is_same_v<decltype(values), const bool*>) {
-      sound = sound && std::all_of(next, next + count, [](double x) { return x == 0.0 || x == 1.0; });
-    } else if (static_cast<const void*>(values) == now_.state.data()) {
-      sound = sound && within(next, motions, largest_motion);
-    }
+  visit_state(*this, [&](const auto* values, std::size_t count, double most) {
+    const bool flags = std::is_same_v<decltype(values), const bool*>;
+    sound = sound && std::all_of(next, next + count,
+                                 [&](double x) { return flags ? x == 0.0 || x == 1.0 : std::fabs(x) <= most; });
     next += count;
   });
-  const double time = numbers[0], samples = numbers[1], rate = rig_.sensors.rate, half_step = next[rig_.joint_count()];
+  const double time = numbers[0], samples = numbers[1], rate = rig_.sensors.rate;
   // as many samples as move_on() takes up to that time
   const bool taken = settings_.sensors ? samples > 0.0 && (samples - 1.0) / rate <= time + same_time &&
                                              samples / rate > time + same_time && samples == std::floor(samples)
                                        : samples == 0.0;
-  return sound && taken && time >= 0.0 && time < longest_time && half_step >= 0.0 && half_step <= settings_.step &&
-         within(next + rig_.joint_count() + 2, motions, largest_motion);
+  return sound && taken && time >= 0.0;
 }
 
 void plant::take_numbers(const std::vector<double>& numbers) {
   evaluated_ = false;
   const double* next = numbers.data();
-  visit_state(*this, [&](auto* values, std::size_t count) {
+  visit_state(*this, [&](auto* values, std::size_t count, double) {
     std::transform(next, next + count, values,
                    [](double x) { return static_cast<std::decay_t<decltype(*values)>>(x); });
     next += count;
   });
-  integrator_->restore_memory(next, inputs_);
+  integrator_->forget();
 }
 
 std::size_t plant::state_bytes() const {

@@ -89,7 +89,7 @@ TEST(Linearisation, SolvesAsTheDenseMatrixDoes) {
     for (int trial = 0; trial < 40; ++trial) {
       one.draw();
       one.evaluate();
-      blocks.take(one.equations, one.state.data(), one.inputs, rigid_slopes::exact);
+      blocks.take(one.equations, one.state.data(), one.inputs);
       Matrix jacobian(size, size);
       blocks.dense(jacobian.data());
       const double gamma = std::pow(10.0, one.between(-7.0, -2.5));
@@ -119,7 +119,7 @@ TEST(Linearisation, IsTheSlopeOfTheEquations) {
       one.draw();
       one.evaluate();
       const contact_modes modes = one.equations.last().modes;
-      blocks.take(one.equations, one.state.data(), one.inputs, rigid_slopes::exact);
+      blocks.take(one.equations, one.state.data(), one.inputs);
       blocks.dense(jacobian.data());
       std::vector<double> low(size), high(size);
       for (std::size_t k = 0; k < size; ++k) {
@@ -146,7 +146,7 @@ TEST(Linearisation, RefusesWhatIsNotFinite) {
   one.state[0] = std::numeric_limits<double>::quiet_NaN();
   one.evaluate();
   linearisation blocks(one.numbers);
-  blocks.take(one.equations, one.state.data(), one.inputs, rigid_slopes::exact);
+  blocks.take(one.equations, one.state.data(), one.inputs);
   EXPECT_FALSE(blocks.factor(1e-4));
 }
 

@@ -109,23 +109,20 @@ def simulate(
     truth: Annotated[
         Path | None, typer.Option(metavar="TRUTH.parquet", help="true signals to write, .csv or .parquet")
     ] = None,
-    integrator: Annotated[str | None, typer.Option(metavar="cvode|fixed_step", help="[default: the rig's]")] = None,
     progress: Progress = None,
 ) -> None:
     """Simulate a finger and write the recording. The same rig gives the same numbers."""
     from tendonfmu.files import check_format
-    from tendonfmu.simulate import INTEGRATORS, read_rig
+    from tendonfmu.simulate import read_rig
     from tendonfmu.simulate import simulate as simulate_rig
 
-    if integrator is not None and integrator not in INTEGRATORS:
-        raise InputError(f"--integrator {integrator}: expected {' or '.join(INTEGRATORS)}")
     read = read_rig(rig)
     check_table(output, *read.files)
     if truth is not None:
         check_format(truth)
         check_second_file(truth, output, "recording and truth", *read.files)
     with progress_bar("samples", progress) as show:
-        result = simulate_rig(read, truth=truth is not None, integrator=integrator, progress=show)
+        result = simulate_rig(read, truth=truth is not None, progress=show)
     if truth is not None and result.truth is not None:
         write_table(truth, result.truth)
     write_table(output, result.recording)

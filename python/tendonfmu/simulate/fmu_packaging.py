@@ -28,7 +28,7 @@ from tendonfmu.fmu import (
     units_of,
 )
 from tendonfmu.model import native
-from tendonfmu.simulate.plant import INTEGRATORS, Plant, Settings, refused_by
+from tendonfmu.simulate.plant import Plant, Settings, refused_by
 from tendonfmu.simulate.rig import Rig, read_rig
 
 BINARIES, BINARY_STEM = "binaries_plant", "tendonfmu_plant"
@@ -118,9 +118,7 @@ def _starts(settings: Settings) -> dict[str, Any]:
     """Return the start values of the parameters as XML writes them."""
     flags = {name: str(getattr(settings, name)).lower() for name in ("scheduled_motion", "scheduled_pushes", "sensors")}
     return {
-        "integrator": INTEGRATORS[settings.integrator],
         "relative_tolerance": settings.relative_tolerance,
-        "step": settings.step,
         **flags,
         "seed": settings.seed,
         "push_link": settings.push_link,

@@ -26,7 +26,6 @@ if HAS_PLANT:
 
 
 PLANT_MISSING = "this installation has no simulated finger (SUNDIALS was not found when it was built)"
-INTEGRATORS = {"cvode": 1, "fixed_step": 2}
 
 # readings of the sensors, and the true signals; sizes as in tendonfmu_plant_signals
 MEASURED = ("tendon_force", "tendon_position", "joint_position", "joint_velocity", "external_torque")
@@ -65,9 +64,7 @@ class SolverError(PlantError):
 class Settings:
     """Settings of a plant; see tendonfmu_plant_settings."""
 
-    integrator: str  # A key of `INTEGRATORS`
     relative_tolerance: float  # of CVODE
-    step: float  # of the fixed-step integrator (s)
     scheduled_motion: bool  # whether the plant runs the rig's motion, pushes and sensors
     scheduled_pushes: bool
     sensors: bool
@@ -149,21 +146,14 @@ class Plant:
     def settings(self) -> Settings:
         """Present settings."""
         with _refusals():
-            integrator, tolerance, step, motion, pushes, sensors, seed, point, link = self._plant.settings()
-        names = {number: name for name, number in INTEGRATORS.items()}
-        x, y, z = point
-        return Settings(names[integrator], tolerance, step, motion, pushes, sensors, seed, (x, y, z), link)
+            return Settings(*self._plant.settings())
 
     def configure(self, **changes: Any) -> None:
         """Change settings, before the initialisation only."""
         wanted = replace(self.settings, **changes)
-        if wanted.integrator not in INTEGRATORS:
-            raise PlantError(f"integrator = {wanted.integrator!r}: expected {' or '.join(INTEGRATORS)}")
         with _refusals():
             self._plant.set_settings(
-                INTEGRATORS[wanted.integrator],
                 wanted.relative_tolerance,
-                wanted.step,
                 wanted.scheduled_motion,
                 wanted.scheduled_pushes,
                 wanted.sensors,

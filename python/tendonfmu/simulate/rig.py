@@ -306,12 +306,6 @@ def _lines(rig: Rig, plant: Plant) -> list[str]:
     contacts = finger.pulleys + finger.edges + finger.laws["friction"] + finger.laws["load_friction"]
     counts = {"pulley": finger.pulleys, "edge": finger.edges, "joint": finger.laws["friction"]}
     kinds = ", ".join(counted(number, kind) for kind, number in counts.items())
-    settings = plant.settings
-    accuracy = (
-        f"relative tolerance {settings.relative_tolerance:g}"
-        if settings.integrator == "cvode"
-        else f"step {1e3 * settings.step:g} ms"
-    )
     lines = {
         "joints": f"{rig.joints}: {', '.join(rig.finger.joint_names)}",
         "tendons": f"{rig.tendons}: {', '.join(rig.finger.tendon_names)}",
@@ -321,7 +315,7 @@ def _lines(rig: Rig, plant: Plant) -> list[str]:
         "motion": f"{rig.motion.says}; {_pretension(rig)}",
         "pushes": str(len(rig.expanded["pushes"])),
         "sensors": "; ".join(_sensors(rig)),
-        "integration": f"{settings.integrator}, {accuracy}",
+        "integration": f"relative tolerance {plant.settings.relative_tolerance:g}",
         "recording": _recording_words(rig),
     }
     head = f"{rig.name}, version {rig.version}: a valid rig of {finger.name}, seed {rig.expanded['seed']}"

@@ -32,7 +32,6 @@ class Simulation:
     recording: Table  # columns of docs/reference/recordings.md
     truth: Table | None  # true signals at the same times, or None if they were not asked for
     contact_seconds: float  # time with a force above the rig's `contact_force` (s)
-    integrator: str  # the integrator that was used
     work: Statistics  # work of the integrator
 
     def summary(self, rig: Rig) -> list[str]:
@@ -41,7 +40,7 @@ class Simulation:
         pushes = len(rig.expanded["pushes"])
         contact = f", {counted(pushes, 'push', 'pushes')}, {self.contact_seconds:.2f} s in contact" if pushes else ""
         length = f"{counted(len(time), 'sample')}, {time[-1]:.3f} s"
-        return [f"{length} of {rig.name}{contact}; {self.integrator}: {counted(self.work.steps, 'step')}"]
+        return [f"{length} of {rig.name}{contact}; {counted(self.work.steps, 'step')} of CVODE"]
 
     def report(self, rig: Rig, written: Mapping[str, Path]) -> dict[str, Any]:
         """Return what `tendonfmu simulate --json` prints. written: name of a table -> its file."""
@@ -56,7 +55,6 @@ class Simulation:
             "columns": list(self.recording),
             "pushes": len(rig.expanded["pushes"]),
             "contact_seconds": float(self.contact_seconds),
-            "integrator": self.integrator,
             "steps": int(self.work.steps),
             **{name: str(file) for name, file in written.items()},
         }
@@ -66,7 +64,6 @@ def simulate(
     rig: Rig,
     *,
     truth: bool = False,
-    integrator: str | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Simulation:
     """Run a rig from its initialisation to the end of its recording.
@@ -79,8 +76,6 @@ def simulate(
         An expanded rig with a recording.
     truth
         Whether to return the true signals as well.
-    integrator
-        "cvode" or "fixed_step", used instead of the rig's.
     progress
         Called with the number of samples done and of all samples.
 
@@ -98,8 +93,6 @@ def simulate(
     time = rig.times()
     plant = plant_of(rig)
     with refused_by(rig.path):
-        if integrator is not None:
-            plant.configure(integrator=integrator)
         plant.initialise()
         names = _wanted(rig, truth)
         parts = []
@@ -108,13 +101,11 @@ def simulate(
             parts.append(plant.run(time[start : start + CHUNK], names))
         progress(len(time), len(time))
         work = plant.statistics
-        used = plant.settings.integrator
     signals = {name: np.concatenate([part[name] for part in parts]) for name in names}
     return Simulation(
         recording=_recording(rig, time, signals),
         truth=_truth(time, signals) if truth else None,
         contact_seconds=float(signals["contact"].sum()) / rig.rate,
-        integrator=used,
         work=work,
     )
 

@@ -1,8 +1,7 @@
-// CVODE and the fixed steps: roots, times next to each other, convergence, and what they say when they give up.
+// CVODE: roots, jumps of the inputs, and what it says when it gives up.
 #include <gtest/gtest.h>
 
-#include "cvode_integrator.h"
-#include "fixed_step_integrator.h"
+#include "integrator.h"
 #include "test_plant.h"
 
 namespace {
@@ -25,16 +24,10 @@ struct Case {
     equations.command_motors(0.0, inputs, now.state.data() + equations.layout().motor());
     now.modes = equations.modes_at(now.state.data());
   }
-  std::unique_ptr<integrator> cvode(double tolerance = 1e-8) { return make_cvode_integrator(&equations, tolerance); }
-};
+  integrator cvode{&equations, 1e-8};
 
-double largest_difference(const std::vector<double>& a, const std::vector<double>& b, std::size_t count) {
-  double most = 0.0;
-  for (std::size_t k = 0; k < count; ++k) {
-    most = std::max(most, std::fabs(a[k] - b[k]));
-  }
-  return most;
-}
+  void advance(double until) { cvode.advance(inputs, until, until, &now); }
+};
 
 /* One hanging link that gravity or a push drives into its lower stop, held by two slack-going tendons. */
 Json one_link(double start, double lower) {
@@ -49,12 +42,11 @@ TEST(Cvode, SwitchesStopsAtTheirRoots) {
   Case one(one_link(0.0, -0.01));
   one.inputs.push.force = {0, 0, 50.0};  // turns about y: downwards in angle
   one.inputs.push.point = {0.04, 0, 0};
-  const auto with = one.cvode();
-  with->advance(one.inputs, 0.2, &one.now);
+  one.advance(0.2);
   EXPECT_LT(one.now.state[0], -0.01);
   EXPECT_TRUE(one.now.modes.below[0]);
-  EXPECT_GE(with->work().roots, 1u);
-  EXPECT_GE(with->work().restarts, with->work().roots);
+  EXPECT_GE(one.cvode.work().roots, 1u);
+  EXPECT_GE(one.cvode.work().restarts, one.cvode.work().roots);
 }
 
 // A start exactly on a stop: CVODE leaves out functions that are 0 at its start.
@@ -64,7 +56,7 @@ TEST(Cvode, SeesAStopThatItStartsOn) {
     each->inputs.push.force = {0, 0, 5.0};
     each->inputs.push.point = {0.04, 0, 0};
     EXPECT_FALSE(each->now.modes.below[0]);
-    each->cvode()->advance(each->inputs, 0.05, &each->now);
+    each->advance(0.05);
     EXPECT_LT(each->now.state[0], -0.01);
     EXPECT_TRUE(each->now.modes.below[0]);
   }
@@ -83,7 +75,7 @@ TEST(Cvode, SeesATendonThatStartsWithoutTension) {
   one.now.modes = {};  // taut, by its sign
   one.inputs.push.force = {0, 0, 1.0};
   one.inputs.push.point = {0.04, 0, 0};
-  one.cvode()->advance(one.inputs, 0.01, &one.now);
+  one.advance(0.01);
   one.equations.evaluate(0.01, one.now.state.data(), &one.now.modes, one.inputs,
                          std::vector<double>(one.numbers.order()).data());
   const evaluation& e = one.equations.last();
@@ -101,10 +93,9 @@ TEST(Cvode, FindsTheObstacle) {
   EXPECT_FALSE(one.now.modes.touching);
   one.inputs.push.force = {0, 0, 20.0};
   one.inputs.push.point = {0.04, 0, 0};
-  const auto with = one.cvode();
   bool touched = false;
   for (int k = 1; k <= 100; ++k) {
-    with->advance(one.inputs, 0.002 * k, &one.now);
+    one.advance(0.002 * k);
     touched = touched || one.now.modes.touching;
     const contact_modes own = one.equations.modes_at(one.now.state.data());
     EXPECT_EQ(one.now.modes.touching, own.touching) << k;
@@ -115,14 +106,13 @@ TEST(Cvode, FindsTheObstacle) {
 
 TEST(Cvode, GivesUpInOneLineAndLeavesTheMomentAlone) {
   Case one(test_plant::small());
-  const auto with = one.cvode();
-  with->advance(one.inputs, 0.01, &one.now);
+  one.advance(0.01);
   const moment before = one.now;
   // a push beyond all bounds
   one.inputs.push = {{1e300, 0, 1e300}, {0.02, 0, 0}, 2};
-  with->forget();
+  one.cvode.forget();
   try {
-    with->advance(one.inputs, 0.5, &one.now);
+    one.advance(0.5);
     FAIL() << "expected a solver_error";
   } catch (const solver_error& failed) {
     const std::string line = failed.what();
@@ -135,32 +125,8 @@ TEST(Cvode, GivesUpInOneLineAndLeavesTheMomentAlone) {
   EXPECT_EQ(one.now.state, before.state);
   // and goes on afterwards
   one.inputs.push.force = {};
-  with->advance(one.inputs, 0.02, &one.now);
+  one.advance(0.02);
   EXPECT_EQ(one.now.time, 0.02);
-}
-
-TEST(FixedSteps, AgreeWithCvodeTheBetterTheSmaller) {
-  Case one(test_plant::small());
-  one.cvode(1e-9)->advance(one.inputs, 0.3, &one.now);
-  double error[2];
-  for (const int fine : {0, 1}) {
-    Case other(test_plant::small());
-    fixed_step_integrator(&other.equations, fine ? 2.5e-5 : 2e-4).advance(other.inputs, 0.3, &other.now);
-    error[fine] = largest_difference(one.now.state, other.now.state, 3);
-  }
-  EXPECT_LT(error[0], 3e-3);
-  EXPECT_LT(error[1], 0.25 * error[0]);
-}
-
-// Heat that is gone within a step must not swing up.
-TEST(FixedSteps, StayStableHoweverFastHeatFades) {
-  for (const double time : {1e-12, 1e-6, 1e-3}) {
-    Case one(test_plant::changed({{"/physics/friction/heat/time_constant", time}}));
-    one.now.state[one.equations.layout().heat()] = 1.0;
-    fixed_step_integrator with(&one.equations, 1e-3);
-    with.advance(one.inputs, 0.2, &one.now);
-    EXPECT_LT(std::fabs(one.now.state[one.equations.layout().heat()]), 1.0 + 1e-3);
-  }
 }
 
 }  // namespace
