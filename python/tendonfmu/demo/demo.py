@@ -115,7 +115,7 @@ class Story:
         for file in DATA.iterdir():
             with whole_file(copied / file.name) as temporary:
                 temporary.write_bytes(file.read_bytes())
-        self.files[copied] = "the built-in data, which the examples of --help use"
+            self.files[copied / file.name] = "built-in data, which the examples of --help use"
         sheets = [replace(sheet, section=each.name) for each in self.chapters for sheet in each.sheets]
         written = [(path.relative_to(self.folder).as_posix(), what) for path, what in self.files.items()]
         content = {"chapters": self.chapters, "missing": self.missing, "files": written}
