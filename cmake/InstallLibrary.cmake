@@ -17,7 +17,7 @@ install(DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}/runtime/include/" DESTINATION "${
 
 install(FILES LICENSE THIRD_PARTY_LICENSES.txt DESTINATION "${CMAKE_INSTALL_DOCDIR}")
 
-# Removes from what users of a library are told to link what they do not need.
+# Users of a library need not link these of its own libraries.
 function(tendonfmu_forget library)
   get_target_property(needed ${library} INTERFACE_LINK_LIBRARIES)
   list(REMOVE_ITEM needed ${ARGN})
