@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tendonfmu.cli.console import PRINTED, Bar
+from tendonfmu.cli.console import MOST_WARNINGS, PRINTED, Bar, print_results
 from tendonfmu.tasks.phases import Phases, PhaseState
 
 SHARES = {"reading": 1.0, "fitting": 6.0, "judging": 3.0}
@@ -102,3 +102,17 @@ def test_a_long_loop_says_how_far_it_is(capfd: pytest.CaptureFixture[str], clock
     expected = [f"recordings, {done} of 12, about {5 * (12 - done)} s left" for done in range(2, 12, 2)]
     expected += ["recordings, 12 of 12"]
     assert capfd.readouterr().err.splitlines() == ([] if quiet else expected)
+
+
+@pytest.mark.parametrize("kinds", [MOST_WARNINGS, MOST_WARNINGS + 2])
+def test_a_few_kinds_of_warnings_stand_behind_a_result(
+    capfd: pytest.CaptureFixture[str], clock: Clock, kinds: int
+) -> None:
+    del clock  # it sees to it that something is printed
+    warnings = [f"kind {'abcdefgh'[k]}: number {number}" for k in range(kinds) for number in (1, 2)]
+    print_results((), ["the result"], "", warnings)
+    out, err = capfd.readouterr()
+    lines = err.splitlines()
+    assert out == "the result\n" and len(lines) == min(kinds, MOST_WARNINGS + 1)
+    assert lines[0] == "tendonfmu: warning: kind a: number 1 (and 1 more of this kind)"
+    assert (lines[-1] == "tendonfmu: warning: 2 more of other kinds: the report and the page have all") == (kinds > 5)
