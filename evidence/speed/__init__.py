@@ -244,7 +244,7 @@ PARTS = {
     "plant": Part(
         plant,
         minutes=0.5,
-        headlines={"CVODE, 1e-06.0": (100.0, 300.0)},
+        headlines={"CVODE, 1e-06.0": (30.0, 300.0)},
         tables={"solvers": plant_table},
     ),
 }
