@@ -30,7 +30,8 @@ def tail_sheet(tuning: ContactTuning) -> Sheet:
         return np.array([point[name] for point in tail], dtype=float)
 
     factors, intervals = column("factor"), column("interval")
-    found, asked, ends = report["kept_out"]["per_hour"], report["false_alarms_per_hour"], factors[[0, -1]]
+    found, asked = report["kept_out"]["per_hour"], report["false_alarms_per_hour"]
+    limits = float(min(factors[0], 0.9)), float(max(factors[-1], 1.1))
     shown = panel(
         "False alarms",
         "False alarms per hour over a factor on the chosen bounds, in motion that was kept out",
@@ -38,14 +39,14 @@ def tail_sheet(tuning: ContactTuning) -> Sheet:
         "false alarms per hour",
         band(factors, intervals[:, 0], intervals[:, 1], "95 % interval"),
         curve(factors, column("per_hour"), "kept out", BLUE, 1.8),
-        curve(ends, np.full(2, asked), f"asked for: {asked:.3g} per hour", VERMILION, 1.3, "dash"),
+        curve(np.array(limits), np.full(2, asked), f"asked for: {asked:.3g} per hour", VERMILION, 1.3, "dash"),
         dots(np.ones(1), np.array([found]), f"found: {found:.3g} per hour", DARK),
         mark(1.0),
         size="wide",
         height=480,
         log_x=True,
         near_y=60.0 / report["minutes"],
-        x_limits=(float(min(ends[0], 0.9)), float(max(ends[1], 1.1))),
+        x_limits=limits,
         y_limits=(0.0, 1.1 * float(max(intervals.max(), found))),
     )
     title = f"{report['finger']}: {report['minutes']:.0f} min of free motion, {report['method']}"
