@@ -78,7 +78,7 @@ def test_one_sensor_that_is_off_keeps_its_name() -> None:
 
 
 def test_corrections_far_beyond_usual_ones_are_none() -> None:
-    """They would shrink the torque, and with it whatever is missing."""
+    """They imitate something else that is missing."""
     together, _ = judged(4.0 * SEVERAL)
     assert together is None or np.mean((together.magnitudes / USUAL) ** 2) <= PLAUSIBLE**2
 

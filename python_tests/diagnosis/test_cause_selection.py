@@ -95,7 +95,7 @@ def test_signs_bound_what_is_learned(columns: Numbers) -> None:
 
 
 def test_corrections_of_the_torque_have_a_largest_size(columns: Numbers) -> None:
-    """A large one would shrink the torque, and with it all that is left of it."""
+    """A large one imitates something else."""
     made = [
         Made("force_gain", None, 2),
         Made("moment_arm", 1, 2),

@@ -23,8 +23,7 @@ from tendonfmu.model import moment_arms
 from tendonfmu.statistics import Interval
 
 STRENGTHS = (0.03, 0.1, 0.3, 1.0, 3.0)  # of the prior knowledge; 1 takes the usual sizes at their word
-# Root mean square of all corrections, in usual sizes. Where something else is missing, larger ones shrink the torque,
-# and with it any error.
+# Root mean square of all corrections, in usual sizes. Larger ones imitate something else that is missing.
 PLAUSIBLE = 1.5
 LARGEST = 5.0  # times the usual size
 _SHOWN = 3  # sensors named in the size

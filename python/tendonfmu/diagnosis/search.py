@@ -65,7 +65,7 @@ class ExtensionSearch(CauseSearch):
 
     def _try_next(self, tried: set[str]) -> tuple[Cause, bool] | None:
         # Refused effects explain something, so no other effect is credited with that. A correction of the torque
-        # itself is excluded: it lowers any error by shrinking the torque.
+        # itself is excluded: it resembles whatever else is missing.
         selection = self.view.beside({refused.key for refused in self.refused if refused.effect not in SCALING})
         best = selection.best(self._least_gain, tried)
         together = calibration(self.view, selection, tried, self._least_gain)
@@ -170,7 +170,7 @@ def beside_calibration(trial: Trial, together: Cause | None) -> Trial:
 
 def _to_fit(best: Cause) -> list[Cause]:
     """Return the effects that cannot be distinguished from the best one and may replace it."""
-    # A correction of the torque itself may replace only another such correction, because it lowers any error.
+    # A correction of the torque itself may replace only another such correction: it resembles most effects.
     scaling = best.effect in SCALING
     return [rival for rival in best.alike if scaling or rival.effect not in SCALING][: MOST_FITTED - 1]
 
