@@ -9,11 +9,7 @@ double law_exponential(double x) {
 }
 
 double law_one_minus_exponential(double x) {
-  if (x > 0.01) {
-    return 1.0 - law_exponential(x);
-  }
-  /* alternating series; the first term left out is below x^7/5040 < 1e-17·x at x = 0.01 */
-  return x * (1.0 - x / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0 * (1.0 - x / 6.0)))));
+  return one_minus_exp_of_minus(x);
 }
 
 /* as fdlibm has it: x = 2^k·(1 + f), s = f/(2 + f), ln(1 + f) = f − f²/2 + s·(f²/2 + R(s²)) */

@@ -113,24 +113,26 @@ static void find_sections(tendonfmu_finger* f) {
   }
 }
 
-/* g at a slot; 1 without relaxation, and at the first sample, whose step is 0 */
-static double decayed_gain(const friction_element* element, size_t slot, double step) {
-  const double time = element->relaxation_time[slot], age = time > 0.0 ? step / time : 0.0;
+/* g, of a relaxation time; 1 without one, and at the first sample, whose step is 0 */
+static double decayed_gain(double time, double step) {
+  const double age = time > 0.0 ? step / time : 0.0;
   return age > 0.0 ? law_one_minus_exponential(age) / age : 1.0;
 }
 
-static void set_decay(const friction_element* element, size_t slot, double step) {
-  const double time = element->relaxation_time[slot], gain = decayed_gain(element, slot, step);
-  element->kept[slot] = time > 0.0 ? law_exponential(step / time) : 1.0;
-  element->stiff[slot] = gain * element->stiffness[slot];
-  element->soft[slot] = gain * element->per_distance[slot];
-}
-
-/* what a and g make of every place in a step of this length, s */
+/* what a and g make of every place in a step of this length, s; most places share their relaxation time */
 static void find_decay(tendonfmu_finger* f, double step) {
+  double time = -1.0, kept = 1.0, gain = 1.0;
   for (size_t e = 0; e < f->memory.elements; ++e) {
+    const friction_element* element = &f->memory.element[e];
     for (size_t slot = 0; slot < f->slots; ++slot) {
-      set_decay(&f->memory.element[e], slot, step);
+      if (element->relaxation_time[slot] != time) {
+        time = element->relaxation_time[slot];
+        kept = time > 0.0 ? law_exponential(step / time) : 1.0;
+        gain = decayed_gain(time, step);
+      }
+      element->kept[slot] = kept;
+      element->stiff[slot] = gain * element->stiffness[slot];
+      element->soft[slot] = gain * element->per_distance[slot];
     }
   }
   f->memory.step = step;
@@ -207,7 +209,8 @@ void follow_elements(const tendonfmu_finger* f, const extension_row* row, double
       continue;
     }
     const double travel = f->scratch.travelled[slot], z = first->kept[slot] * row->memory[k];
-    const double gain = decayed_gain(first, slot, f->scratch.sample.first ? 0.0 : f->scratch.sample.step);
+    const double gain =
+        decayed_gain(first->relaxation_time[slot], f->scratch.sample.first ? 0.0 : f->scratch.sample.step);
     const double moved = travel == 0.0 ? z : z + gain * steepness(f, slot, size) * travel;
     row->next[k] = moved > 1.0 ? 1.0 : moved < -1.0 ? -1.0 : moved;
   }
@@ -219,5 +222,6 @@ double follower_slope(const tendonfmu_finger* f, const extension_row* row, size_
   if (slot >= f->joints * f->tendon_lanes || f->memory.remembers[slot] == 0.0 || z >= 1.0 || z <= -1.0) {
     return 0.0;
   }
-  return decayed_gain(&f->memory.element[0], slot, f->remembered.scalar[STATE_STEP]) * steepness(f, slot, size);
+  return decayed_gain(f->memory.element[0].relaxation_time[slot], f->remembered.scalar[STATE_STEP]) *
+         steepness(f, slot, size);
 }

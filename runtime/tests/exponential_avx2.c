@@ -10,6 +10,7 @@
 #pragma GCC target("avx2")
 #endif
 
+#define TENDONFMU_QUAD_AVX2
 #define TENDONFMU_QUAD_LANES 4
 #include "exponential.h"
 #include "exponential_kernels.h"

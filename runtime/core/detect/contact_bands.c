@@ -27,22 +27,25 @@ static double smaller(double a, double b) {
   return a < b ? a : b;
 }
 
-static double share_of(double step, double time) {
-  return law_one_minus_exponential(step / time);
-}
-
-void band_find_shares(band_shares* shares, double step) {
+void band_find_shares(band_shares* shares, double step,
+                      void (*one_minus_exponentials)(const double* x, double* values, size_t count)) {
+  _Alignas(32) double value[12] = {[8] = step / HELD_TIME, [9] = step / UNKNOWN_TIME};
   if (shares->step == step) {
     return;
   }
+  for (size_t k = 0; k < BANDS; ++k) {
+    value[k] = step / mean_time[k];
+    value[BANDS + k] = step / reference_time[k];
+  }
+  one_minus_exponentials(value, value, 12);
   shares->step = step;
   for (size_t k = 0; k < BANDS; ++k) {
-    shares->mean[k] = share_of(step, mean_time[k]);
-    shares->reference[k] = share_of(step, reference_time[k]);
+    shares->mean[k] = value[k];
+    shares->reference[k] = value[BANDS + k];
     shares->kept[k] = 1.0 - shares->reference[k];
   }
-  shares->held = share_of(step, HELD_TIME);
-  shares->unknown = 1.0 - share_of(step, UNKNOWN_TIME);
+  shares->held = value[8];
+  shares->unknown = 1.0 - value[9];
 }
 
 void band_begin(band_memory* joint, const band_sample* sample, double time, double unknown, int first) {
@@ -66,9 +69,10 @@ void band_begin(band_memory* joint, const band_sample* sample, double time, doub
 
 /* σ of the means and the references of a joint that began `age` ago: means of what there has been since */
 static void find_shares_since(const band_shares* shares, double age, double* quick, double* slow) {
+  const double all = age < reference_time[BANDS - 1] ? law_one_minus_exponential(shares->step / age) : 0.0;
   for (size_t k = 0; k < BANDS; ++k) {
-    quick[k] = age < mean_time[k] ? share_of(shares->step, age) : shares->mean[k];
-    slow[k] = age < reference_time[k] ? share_of(shares->step, age) : shares->reference[k];
+    quick[k] = age < mean_time[k] ? all : shares->mean[k];
+    slow[k] = age < reference_time[k] ? all : shares->reference[k];
   }
 }
 

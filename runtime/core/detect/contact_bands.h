@@ -45,8 +45,9 @@ typedef struct band_shares {
   double unknown;
 } band_shares;
 
-/* Fills the shares unless they are those of this step. */
-void band_find_shares(band_shares* shares, double step);
+/* Fills the shares unless they are those of this step. one_minus_exponentials: of a kernel (kernel_choice.h). */
+void band_find_shares(band_shares* shares, double step,
+                      void (*one_minus_exponentials)(const double* x, double* values, size_t count));
 
 /* A joint begins anew; unknown: V. First: at the first sample, where it was not watched, and when it first moves. */
 void band_begin(band_memory* joint, const band_sample* sample, double time, double unknown, int first);

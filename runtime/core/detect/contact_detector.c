@@ -4,6 +4,8 @@
 
 #include <math.h>
 
+#include "kernel_choice.h"
+
 /* |r| over its threshold */
 static double residual_level(double size, double bound) {
   const double level = bound > 0.0 ? size / bound : size > 0.0 ? LARGEST_SUM : 0.0;
@@ -53,7 +55,7 @@ static int exceed_bands(tendonfmu_finger* f, double time, double step) {
   const finger_state* s = &f->remembered;
   const int before = s->scalar[STATE_CONTACT] != 0.0;
   int any = 0;
-  band_find_shares(&f->scratch.shares, step);
+  band_find_shares(&f->scratch.shares, step, f->kernel->one_minus_exponentials);
   for (size_t j = 0; j < f->joints; ++j) {
     f->scratch.unknown[j] = band_unknown(bands_of(f, j));
     if (f->derived.settings.watches_sensors && s->watch[j] != JOINT_WATCHED) {

@@ -244,7 +244,7 @@ HOT_INLINE void friction_limits(tendonfmu_finger* f) {
   const finger_scratch* s = &f->scratch;
   const size_t n = f->joints, lanes = f->tendon_lanes, joint_row = n * lanes;
   quad_sums total[MODEL_MAX_JOINTS];
-  memset(total, 0, n * sizeof *total);
+  memset(total, 0, f->joint_lanes * sizeof *total);
   for (size_t i = 0; i < lanes; i += QUAD_LANES) {
     quad held = quad_set(0.0);
     for (size_t at = i, j = 0; j < n; at += lanes, ++j) {
@@ -255,11 +255,10 @@ HOT_INLINE void friction_limits(tendonfmu_finger* f) {
       quad_sums_add(&total[j], i, quad_abs(quad_load(f->derived.moment_arm + at)) * held);
     }
   }
-  for (size_t j = 0; j < n; ++j) {
-    const double own = f->memory.elements ? s->own_limit[j] : 0.0;
-    const double limit =
-        quad_sum(&total[j]) + (s->edge_limit[joint_row + j] + s->pulley_limit[joint_row + j] * s->load[j]);
-    s->limit[j] = limit + own;
+  for (size_t j = 0; j < f->joint_lanes; j += QUAD_LANES) {
+    const quad load = quad_load(s->pulley_limit + joint_row + j) * quad_load(s->load + j);
+    const quad own = f->memory.elements ? quad_load(s->own_limit + j) : quad_set(0.0);
+    quad_store(s->limit + j, quad_sum_rows(total + j) + (quad_load(s->edge_limit + joint_row + j) + load) + own);
   }
 }
 

@@ -20,7 +20,8 @@ typedef struct places {
   size_t slot, at; /* at: in rows of edges and pulleys */
   quad limit;      /* lim */
   quad turned;     /* c0 */
-  quad compliance; /* S/k_c; 0 at joints */
+  int stretches;   /* the cords there, by the next; else everything about it drops out, to the bit */
+  quad compliance; /* S/k_c */
 } places;
 
 HOT_INLINE quad limit_of(quad friction) {
@@ -36,6 +37,9 @@ typedef struct trial {
 } trial;
 
 HOT_INLINE quad trial_force(const trial* t, const places* p, quad other) {
+  if (!p->stretches) {
+    return t->kept + t->rate * p->turned;
+  }
   return (t->kept + t->rate * (p->turned - other * p->compliance)) / (1.0 + t->rate * p->compliance);
 }
 
@@ -73,7 +77,7 @@ HOT_INLINE void solve_pair(trial t[2], const places* p) {
   }
 }
 
-/* The same with one element and rigid cords: nothing is divided, and what does not wait for the force comes first. */
+/* The same with one element and rigid cords: what does not wait for the force comes first. */
 HOT_INLINE quad step_alone(tendonfmu_finger* f, const places* p) {
   const finger_scratch* s = &f->scratch;
   const friction_element* element = &f->memory.element[0];
@@ -98,11 +102,13 @@ HOT_INLINE quad step_places(tendonfmu_finger* f, const places* p) {
   for (size_t e = 0; e < f->memory.elements; ++e) {
     t[e] = begin_trial(f, p, e);
   }
-  if (f->memory.elements == 2) {
+  if (p->stretches && f->memory.elements == 2) {
     solve_pair(t, p);
   } else {
-    t[0].held = trial_force(&t[0], p, zero);
-    end_trial(&t[0]);
+    for (size_t e = 0; e < f->memory.elements; ++e) {
+      t[e].held = trial_force(&t[e], p, zero);
+      end_trial(&t[e]);
+    }
   }
   for (size_t e = 0; e < f->memory.elements; ++e) {
     const quad force = clip_to(t[e].held, t[e].limit);
@@ -110,43 +116,49 @@ HOT_INLINE quad step_places(tendonfmu_finger* f, const places* p) {
     sum += force;
     by_turning += quad_keep(t[e].free, t[e].rate);
   }
-  const quad turned = p->turned - sum * p->compliance; /* c */
+  quad turned = p->turned; /* c */
+  if (p->stretches) {
+    turned -= sum * p->compliance;
+  }
   for (size_t e = 0; e < f->memory.elements; ++e) {
     const friction_element* element = &f->memory.element[e];
     const quad slips = quad_with_sign(quad_set(1.0), t[e].held);
     const quad own = quad_select(t[e].free, quad_load(element->soft + p->slot) * turned, slips);
     by_limit += quad_load(element->share + p->slot) * own;
   }
-  const quad stiffness = 1.0 + by_turning * p->compliance;
-  quad_store(s->by_turning + p->at, by_turning / stiffness);
-  quad_store(s->by_limit + p->at, by_limit / stiffness);
+  if (p->stretches) {
+    const quad stiffness = 1.0 + by_turning * p->compliance;
+    by_turning = by_turning / stiffness;
+    by_limit = by_limit / stiffness;
+  }
+  quad_store(s->by_turning + p->at, by_turning);
+  quad_store(s->by_limit + p->at, by_limit);
   return sum;
+}
+
+/* F of places on rigid cords. */
+HOT_INLINE quad step_rigid(tendonfmu_finger* f, size_t slot, size_t row, quad limit) {
+  const places p = {
+      .slot = slot, .at = row * f->slots + slot, .limit = limit, .turned = quad_load(f->scratch.travelled + slot)};
+  return f->memory.elements > 1 ? step_places(f, &p) : step_alone(f, &p);
 }
 
 /* What some tendons lose at their edges or pulleys at a slot, with |F| of the law and the force before them. */
 HOT_INLINE quad loss_of_memory(tendonfmu_finger* f, size_t slot, size_t row, quad magnitude, quad acting, quad before) {
-  const int stretches = f->memory.stretch > 0.0;
-  places p = {.slot = slot,
-              .at = row * f->slots + slot,
-              .limit = acting * limit_of(magnitude),
-              .turned = quad_load(f->scratch.travelled + slot),
-              .compliance = quad_set(0.0)};
-  if (stretches) {
-    p.compliance = quad_load(f->memory.sections + slot) * f->memory.stretch;
-    p.turned += (before - quad_load(f->remembered.tension + p.at)) * p.compliance;
+  const quad limit = acting * limit_of(magnitude);
+  if (!(f->memory.stretch > 0.0)) {
+    return step_rigid(f, slot, row, limit);
   }
-  return stretches || f->memory.elements > 1 ? step_places(f, &p) : step_alone(f, &p);
+  places p = {.slot = slot, .at = row * f->slots + slot, .limit = limit, .stretches = 1};
+  p.compliance = quad_load(f->memory.sections + slot) * f->memory.stretch;
+  const quad tension = quad_load(f->remembered.tension + p.at);
+  p.turned = quad_load(f->scratch.travelled + slot) + (before - tension) * p.compliance;
+  return step_places(f, &p);
 }
 
 /* The same of the joints' own friction. */
 HOT_INLINE quad torque_of_memory(tendonfmu_finger* f, size_t joint, quad limit) {
-  const size_t slot = f->joints * f->tendon_lanes + joint;
-  const places p = {.slot = slot,
-                    .at = EDGES * f->slots + slot,
-                    .limit = limit,
-                    .turned = quad_load(f->scratch.travelled + slot),
-                    .compliance = quad_set(0.0)};
-  return f->memory.elements > 1 ? step_places(f, &p) : step_alone(f, &p);
+  return step_rigid(f, f->joints * f->tendon_lanes + joint, EDGES, limit);
 }
 
 /* What is behind an edge or a pulley, for the stretch of the cord there at the next sample. */

@@ -6,6 +6,8 @@
 /* What of a sample is computed on lanes side by side. */
 struct step_kernel {
   const char* name;
+  /* 1 − exp(−x) of x >= 0 [count], a multiple of 4; both aligned to 32 bytes */
+  void (*one_minus_exponentials)(const double* x, double* values, size_t count);
   /* product [N] of a matrix [n × M] and x [M] */
   void (*multiply)(const tendonfmu_finger* finger, const double* matrix, const double* x, double* product);
   /* eq. (5), from the joint velocities in the last row of velocity [n × M + N] */

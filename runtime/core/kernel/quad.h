@@ -33,9 +33,15 @@ enum { QUAD_LANES = TENDONFMU_QUAD_LANES };
 typedef double quad __attribute__((vector_size(8 * TENDONFMU_QUAD_LANES), may_alias));
 typedef int64_t quad_mask __attribute__((vector_size(8 * TENDONFMU_QUAD_LANES))); /* 0 or −1 */
 
-#if defined(__x86_64__) && TENDONFMU_QUAD_LANES == 4
+#if defined(__clang__)
+#define QUAD_SHUFFLE(a, b, ...) __builtin_shufflevector(a, b, __VA_ARGS__)
+#else
+#define QUAD_SHUFFLE(a, b, ...) __builtin_shuffle(a, b, (quad_mask){__VA_ARGS__})
+#endif
+
+#if defined(TENDONFMU_QUAD_AVX2)
 #define QUAD_X86(name) __builtin_ia32_##name##pd256
-#elif defined(__x86_64__)
+#elif defined(__x86_64__) && TENDONFMU_QUAD_LANES == 2
 #define QUAD_X86(name) __builtin_ia32_##name##pd
 #endif
 
@@ -43,7 +49,7 @@ HOT_INLINE quad quad_keep(quad_mask m, quad a) {
   return (quad)((quad_mask)a & m);
 }
 HOT_INLINE quad quad_select(quad_mask m, quad a, quad b) {
-#if defined(__x86_64__) && TENDONFMU_QUAD_LANES == 4
+#if defined(TENDONFMU_QUAD_AVX2)
   return QUAD_X86(blendv)(b, a, (quad)m);
 #endif
   return (quad)(((quad_mask)a & m) | ((quad_mask)b & ~m));
@@ -139,20 +145,19 @@ typedef struct quad_sums {
 HOT_INLINE void quad_sums_add(quad_sums* sums, size_t i, quad a) {
   sums->of[i / QUAD_LANES % (4 / QUAD_LANES)] += a;
 }
-HOT_INLINE double quad_sum(const quad_sums* sums) {
-  double of[4];
-  memcpy(of, sums, sizeof of);
-  return (of[0] + of[2]) + (of[1] + of[3]);
-}
-/* lane k: quad_sum(row[k]) */
+/* lane k: the sum of row k, (s0 + s2) + (s1 + s3) */
 HOT_INLINE quad quad_sum_rows(const quad_sums row[QUAD_LANES]) {
-#if defined(TENDONFMU_QUAD_LANES)
-  quad sums = {0.0};
-  for (int k = 0; k < QUAD_LANES; ++k) {
-    sums[k] = quad_sum(&row[k]);
-  }
-  return sums;
+#if defined(TENDONFMU_QUAD_LANES) && TENDONFMU_QUAD_LANES == 4
+  const quad even[2] = {QUAD_SHUFFLE(row[0].of[0], row[1].of[0], 0, 4, 2, 6),
+                        QUAD_SHUFFLE(row[2].of[0], row[3].of[0], 0, 4, 2, 6)};
+  const quad odd[2] = {QUAD_SHUFFLE(row[0].of[0], row[1].of[0], 1, 5, 3, 7),
+                       QUAD_SHUFFLE(row[2].of[0], row[3].of[0], 1, 5, 3, 7)};
+  return (QUAD_SHUFFLE(even[0], even[1], 0, 1, 4, 5) + QUAD_SHUFFLE(even[0], even[1], 2, 3, 6, 7)) +
+         (QUAD_SHUFFLE(odd[0], odd[1], 0, 1, 4, 5) + QUAD_SHUFFLE(odd[0], odd[1], 2, 3, 6, 7));
+#elif defined(TENDONFMU_QUAD_LANES)
+  const quad first = row[0].of[0] + row[0].of[1], second = row[1].of[0] + row[1].of[1];
+  return QUAD_SHUFFLE(first, second, 0, 2) + QUAD_SHUFFLE(first, second, 1, 3);
 #else
-  return quad_sum(row);
+  return (row->of[0] + row->of[2]) + (row->of[1] + row->of[3]);
 #endif
 }

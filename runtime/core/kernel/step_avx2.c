@@ -11,6 +11,7 @@
 #pragma GCC target("avx2")
 #endif
 
+#define TENDONFMU_QUAD_AVX2
 #define TENDONFMU_QUAD_LANES 4
 #include "step_kernel.h"
 

@@ -45,5 +45,11 @@ static void tendon_velocities(const tendonfmu_finger* f, double* velocity) {
   }
 }
 
+static void one_minus_exponentials(const double* x, double* values, size_t count) {
+  for (size_t i = 0; i < count; i += QUAD_LANES) {
+    quad_store(values + i, one_minus_exp_of_minus(quad_load(x + i)));
+  }
+}
+
 #define STEP_KERNEL(name) \
-  { name, multiply, tendon_velocities, find_friction, remember_slots, restart_rests }
+  { name, one_minus_exponentials, multiply, tendon_velocities, find_friction, remember_slots, restart_rests }

@@ -1,9 +1,14 @@
-/* The step on vectors of two doubles, which every x86-64 and every 64-bit ARM processor has. */
+/* The step on vectors of the kind that every x86-64 and every 64-bit ARM processor has. */
 #include "floating_point.h"
 
 #if defined(__GNUC__) && (defined(__x86_64__) || defined(__aarch64__))
 
+#if defined(__clang__)
+#pragma clang diagnostic ignored "-Wpsabi" /* nothing of it leaves this file */
+#define TENDONFMU_QUAD_LANES 4             /* two vectors side by side, which GCC would move through memory */
+#else
 #define TENDONFMU_QUAD_LANES 2
+#endif
 #include "step_kernel.h"
 
 #if defined(__x86_64__)
