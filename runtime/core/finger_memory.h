@@ -123,28 +123,23 @@ enum {
   STATE_SCALARS = 12     /* a multiple of 4: the rows stay aligned */
 };
 
-/* Rows of tendons that sensor_fault remembers. */
-typedef enum sensor_row_kind {
-  SENSOR_FAULT,       /* sensor_fault_kind */
-  SENSOR_FAULT_SINCE, /* s; 0 without a fault */
-  SENSOR_UNSOUND_AT,  /* s, last sample of a fault that the springs contradict; 0 without a fault */
-  SENSOR_KNOWN,       /* 1 where w of the last sample follows from the others, with the rows still in use */
-  SENSOR_FORCE,       /* f0, x0 and w of the last sample: N, m, m */
-  SENSOR_POSITION,
-  SENSOR_JOINT_SIDE,
-  SENSOR_HELD_FORCE, /* N, from which f0 has not gone by more than its resolution, and since when: s */
-  SENSOR_FORCE_HELD_SINCE,
-  SENSOR_HAS_TAUT,   /* 1 where the next two are known */
-  SENSOR_TAUT_FORCE, /* N, f0 and y = k·(x0 − w) of a sample with a taut tendon */
-  SENSOR_TAUT_SPRING,
-  SENSOR_HELD_POSITION, /* m, the same of x0, and since when: s */
-  SENSOR_POSITION_HELD_SINCE,
-  SENSOR_FORCE_THEN, /* N, m: f0 and w when x0 was there first */
-  SENSOR_JOINT_SIDE_THEN,
-  SENSOR_ROWS
-} sensor_row_kind;
-
 typedef enum sensor_fault_kind { SENSOR_IS_WELL, FORCE_FAILS, POSITION_FAILS } sensor_fault_kind;
+
+/* What sensor_fault remembers of a tendon: doubles alone, since it is a part of the saved state. */
+typedef struct sensor_memory {
+  double fault;                              /* sensor_fault_kind */
+  double fault_since;                        /* s; 0 without a fault */
+  double unsound_at;                         /* s, last sample of a fault that the springs contradict; 0 without */
+  double known;                              /* 1 where w follows from the others, with the rows still in use */
+  double force, position, joint_side;        /* f0, x0 and w of the last sample: N, m, m */
+  double held_force, force_held_since;       /* N, from which f0 has not gone by more than its resolution; s */
+  double has_taut;                           /* 1 where the next two are known */
+  double taut_force, taut_spring;            /* N, f0 and y = k·(x0 − w) of a sample with a taut tendon */
+  double held_position, position_held_since; /* m, the same of x0; s */
+  double force_then, joint_side_then;        /* N, m: f0 and w when x0 was there first */
+} sensor_memory;
+
+enum { SENSOR_NUMBERS = sizeof(sensor_memory) / sizeof(double) };
 
 /* What a joint whose torque a failing sensor falsifies remembers. */
 typedef enum joint_watch { JOINT_WATCHED, JOINT_BLIND, JOINT_BEGINS_ANEW } joint_watch;
@@ -167,7 +162,7 @@ typedef struct finger_state {
   double *stuck_since, *last_stuck; /* s */
   double* jumped;                   /* [N] Σ Δb, N·m; this and the next with contact.bands only */
   double* bands;                    /* [N] band_memory */
-  double* sensor;                   /* [SENSOR_ROWS × M]; this and the next with sensor_fault only */
+  double* sensor;                   /* [M] sensor_memory; this and the next with sensor_fault only */
   double* watch;                    /* [N] joint_watch of the last sample */
   /* with a memory of friction only; edges in the first row of slots, pulleys in the second */
   double* element;               /* [elements × 2 × (n × M + N)] F of each element, N, N·m */
@@ -213,6 +208,7 @@ typedef struct finger_row {
   int whole;                      /* whole numbers only */
   int spare;                      /* lanes that stand for nothing are tracked along; else they hold 0 */
   const struct finger_row* parts; /* [count] where each has limits of its own */
+  int together;                   /* the numbers of one lane stand together, not the lanes of one number */
 } finger_row;
 
 /* The state in its order. */
@@ -253,7 +249,7 @@ typedef struct finger_scratch {
   double* unknown;                   /* [N] max(V, W) before this sample, N·m */
   band_shares shares;                /* of the last step */
   /* with sensor_fault only */
-  double* sensor;           /* [SENSOR_ROWS × M] as in the state, after this sample */
+  double* sensor;           /* [M] as in the state, after this sample */
   double* inverse_routing;  /* [n × M] R⁺ of the rows in use */
   double* leverage;         /* [M] h/(1 − h) of the rows in use; 0 of the others */
   double* determined;       /* [M] 1: the others determine the angles */
@@ -322,9 +318,9 @@ static inline double angle_before_step(const tendonfmu_finger* finger, size_t jo
   return finger->derived.settings.watches_sensors ? angle + finger->scratch.angle_shift[joint] : angle;
 }
 
-/* Row of the sensors in memory. */
-static inline double* sensor_row(const tendonfmu_finger* finger, double* sensor, sensor_row_kind row) {
-  return sensor + (size_t)row * finger->tendon_lanes;
+/* What sensor_fault remembers of each tendon, in `sensor` of the state or of scratch. */
+static inline sensor_memory* sensors_in(double* sensor) {
+  return (sensor_memory*)(void*)sensor;
 }
 
 /* Rows of lanes: four at once, for which no library is called. */

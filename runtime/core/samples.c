@@ -99,10 +99,9 @@ static void give_numbers(double* to, const double* from, size_t count, size_t ro
   }
 }
 
-/* from NULL: 0 */
 static void give_flags(unsigned char* to, const double* from, size_t count, size_t row) {
   for (size_t i = 0; to && i < count; ++i) {
-    to[row * count + i] = from && from[i] != 0.0;
+    to[row * count + i] = from[i] != 0.0;
   }
 }
 
@@ -129,8 +128,11 @@ static void give_terms(double* to, const tendonfmu_finger* f, size_t row) {
 
 /* failing sensors and what they hide; 0 without sensor_fault */
 static void give_sensors(const tendonfmu_finger* finger, const tendonfmu_outputs* outputs, size_t row) {
-  double* sensor = finger->remembered.sensor;
-  give_flags(outputs->sensor_fault, sensor ? sensor_row(finger, sensor, SENSOR_FAULT) : NULL, finger->tendons, row);
+  const sensor_memory* sensor = sensors_in(finger->remembered.sensor);
+  const size_t m = finger->tendons;
+  for (size_t i = 0; outputs->sensor_fault && i < m; ++i) {
+    outputs->sensor_fault[row * m + i] = sensor && sensor[i].fault != SENSOR_IS_WELL;
+  }
   if (outputs->contact_observable) {
     outputs->contact_observable[row] = sensor && !any_joint_is_blind(finger);
   }

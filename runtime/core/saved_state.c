@@ -9,7 +9,7 @@
 #include "parameters.h"
 #include "sensor_fault.h"
 
-enum { HEADER_BYTES = 40, HASHED_FROM = 32, STATE_VERSION = 2 };
+enum { HEADER_BYTES = 40, HASHED_FROM = 32, STATE_VERSION = 3 };
 
 static const char magic[8] = "TFMUSTA";
 
@@ -46,28 +46,23 @@ static int is_in_use(const tendonfmu_finger* f, row_unit unit, size_t i) {
   }
 }
 
-/* whether the numbers [count] from `from` on are within limits; those of lanes that stand for nothing are 0 */
-static int is_within(const tendonfmu_finger* f, const unsigned char* from, row_unit unit, const finger_row* limits) {
-  const size_t count = unit_length(f, unit);
-  for (size_t i = 0; i < count; ++i) {
-    const int tied = !limits->spare && !is_in_use(f, unit, i);
-    const double value = load_f64(from + 8 * i), low = tied ? 0.0 : limits->low, high = tied ? 0.0 : limits->high;
-    if (!(value >= low && value <= high) || (limits->whole && value != (double)(int)value)) {
-      return 0; /* NaN is neither */
-    }
-  }
-  return 1;
+/* whether number `part` of a row in lane i is within limits; those of lanes that stand for nothing are 0 */
+static int is_within(const tendonfmu_finger* f, const finger_row* row, size_t part, size_t i, double value) {
+  const finger_row* limits = row->parts ? row->parts + part : row;
+  const int tied = !limits->spare && !is_in_use(f, row->unit, i);
+  const double low = tied ? 0.0 : limits->low, high = tied ? 0.0 : limits->high;
+  return value >= low && value <= high && (!limits->whole || value == (double)(int)value); /* NaN is neither */
 }
 
 static int rows_are_sound(const tendonfmu_finger* f, const unsigned char* state) {
   const unsigned char* from = state;
   for (const finger_row* row = state_rows; row < state_rows + state_row_count; ++row) {
-    const size_t count = row_count(f, row) * row->pointers;
-    for (size_t k = 0; k < count; ++k) {
-      if (!is_within(f, from, row->unit, row->parts ? row->parts + k : row)) {
+    const size_t parts = row_count(f, row) * row->pointers, lanes = unit_length(f, row->unit);
+    for (size_t k = 0; k < parts * lanes; ++k, from += 8) {
+      const size_t part = row->together ? k % parts : k / lanes, lane = row->together ? k / parts : k % lanes;
+      if (!is_within(f, row, part, lane, load_f64(from))) {
         return 0;
       }
-      from += 8 * unit_length(f, row->unit);
     }
   }
   return f->derived.settings.watches_sensors || load_f64(state + 8 * STATE_UNWELL) == 0.0;
@@ -112,7 +107,7 @@ static int rests_are_sound(const tendonfmu_finger* f, const unsigned char* state
 static int check_bytes(tendonfmu_finger* f, const unsigned char* from, message_line message) {
   const size_t size = saved_state_size(f), p = f->shape.parameter_count;
   if (memcmp(from, magic, sizeof magic) != 0 || load_u32(from + 8) != STATE_VERSION) {
-    return refuse(message, "not a saved state of this version: it does not begin with \"TFMUSTA\" and 2");
+    return refuse(message, "not a saved state of this version: it does not begin with \"TFMUSTA\" and 3");
   }
   if (load_u32(from + 12) != 0 || load_u64(from + 16) != size || load_u64(from + 32) != f->image_id) {
     return refuse(message, "saved state of another finger: size or model image differ");

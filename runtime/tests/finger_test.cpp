@@ -438,12 +438,12 @@ TEST(SavedState, OfWatchedSensorsWithANumberThatCannotBeIsRefused) {
   Finger finger(image_of(test_finger::watching));
   finger.run(failing());
   const finger_state& s = finger.handle->remembered;
-  const std::size_t lanes = finger.handle->tendon_lanes;
-  expect_refused(finger, {{"third fault", s.sensor + SENSOR_FAULT * lanes, 3.0},
-                          {"fault without a tendon", s.sensor + SENSOR_FAULT * lanes + 3, 1.0},
-                          {"half known", s.sensor + SENSOR_KNOWN * lanes, 0.5},
-                          {"fault since no time", s.sensor + SENSOR_FAULT_SINCE * lanes, 1e16},
-                          {"not a number", s.sensor + SENSOR_TAUT_FORCE * lanes, nan},
+  sensor_memory* sensor = sensors_in(s.sensor);
+  expect_refused(finger, {{"third fault", &sensor[0].fault, 3.0},
+                          {"fault without a tendon", &sensor[3].fault, 1.0},
+                          {"half known", &sensor[0].known, 0.5},
+                          {"fault since no time", &sensor[0].fault_since, 1e16},
+                          {"not a number", &sensor[1].taut_force, nan},
                           {"third watch", s.watch, 3.0},
                           {"twice unwell", finger.handle->state + STATE_UNWELL, 2.0}});
 }
@@ -483,8 +483,9 @@ TEST(SensorFault, ARowLeavesAndComesBackExactly) {
   const std::vector<double> whole(finger.handle->derived.inverse_routing,
                                   finger.handle->derived.inverse_routing + joints * finger.handle->tendon_lanes);
   const double* inverse = finger.handle->scratch.inverse_routing;
-  double fault[4] = {0.0, FORCE_FAILS, 0.0, 0.0};
-  use_rows(finger.handle, fault);
+  sensor_memory sensor[4] = {};
+  sensor[1].fault = FORCE_FAILS;
+  use_rows(finger.handle, sensor);
   EXPECT_EQ(finger.handle->scratch.angles_determined, 1);
   for (std::size_t j = 0; j < joints; ++j) {
     for (std::size_t k = 0; k < joints; ++k) { /* R⁺ R = 1 without that row */
@@ -497,8 +498,8 @@ TEST(SensorFault, ARowLeavesAndComesBackExactly) {
     }
     EXPECT_EQ(inverse[j * finger.handle->tendon_lanes + 1], 0.0);
   }
-  fault[0] = POSITION_FAILS; /* both of a pair */
-  use_rows(finger.handle, fault);
+  sensor[0].fault = POSITION_FAILS; /* both of a pair */
+  use_rows(finger.handle, sensor);
   EXPECT_EQ(finger.handle->scratch.angles_determined, 0);
   recall_rows(finger.handle);
   EXPECT_TRUE(std::equal(whole.begin(), whole.end(), inverse));

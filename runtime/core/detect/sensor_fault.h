@@ -10,14 +10,14 @@
 #define LEAST_FREEDOM 0.1
 
 /* Fills R⁺ of the rows in use in scratch, and what the other rows predict of each.
- *   fault [M]     sensor_fault_kind of each tendon; tendons of failing sensors leave in ascending order */
-void use_rows(tendonfmu_finger* finger, const double* fault);
+ *   sensor [M]    whose faults count; tendons of failing sensors leave in ascending order */
+void use_rows(tendonfmu_finger* finger, const sensor_memory* sensor);
 
 /* The same from what the finger remembers; nothing without sensor_fault. */
 void recall_rows(tendonfmu_finger* finger);
 
 /* Weights [m] of the tendons in the mean force: 1/(number of sound ones), 0 of a failing force; all where all fail. */
-void weigh_forces(const tendonfmu_finger* finger, const double* fault, double* weight);
+void weigh_forces(const tendonfmu_finger* finger, const sensor_memory* sensor, double* weight);
 
 /* Whether a joint was blind at the last sample; 0 without sensor_fault. */
 int any_joint_is_blind(const tendonfmu_finger* finger);
