@@ -4,6 +4,7 @@
 
 #include <math.h>
 
+#include "pseudo_inverse.h"
 #include "sensor_fault.h"
 
 static const double told_share = 0.01;     /* of the largest eigenvalue: a tenth of the standard deviation's inverse */
@@ -12,49 +13,6 @@ static const double turning_share = 1e-8;  /* above it a force along the directi
 static const double stands_out = 5.0;      /* standard deviations */
 static const double largest_misfit = 1e12;
 static const double largest_torque = 1e30; /* N·m, far beyond what inputs make; a restored state may hold any */
-
-enum { MAX_SWEEPS = 30 };
-
-/* A symmetric matrix on its way to a diagonal one, and what it was turned by. */
-typedef struct spectrum {
-  double matrix[3][3];    /* the eigenvalues on the diagonal at the end */
-  double direction[3][3]; /* eigenvector k */
-  double trace;           /* which no rotation changes */
-} spectrum;
-
-/* Jacobi's rotation, which makes element (p, q) zero; returns 0 when it is as good as that */
-static int rotate(spectrum* s, int p, int q) {
-  const double pp = s->matrix[p][p], qq = s->matrix[q][q], pq = s->matrix[p][q];
-  if (fabs(pq) <= 1e-17 * s->trace) {
-    return 0;
-  }
-  const double zeta = (qq - pp) / (2.0 * pq);
-  const double tangent = copysign(1.0, zeta) / (fabs(zeta) + sqrt(1.0 + zeta * zeta));
-  const double cosine = 1.0 / sqrt(1.0 + tangent * tangent), sine = cosine * tangent;
-  const int other = 3 - p - q;
-  const double po = s->matrix[p][other], qo = s->matrix[q][other];
-  s->matrix[p][p] = fmax(0.0, pp - tangent * pq);
-  s->matrix[q][q] = fmax(0.0, qq + tangent * pq);
-  s->matrix[p][q] = s->matrix[q][p] = 0.0;
-  s->matrix[p][other] = s->matrix[other][p] = cosine * po - sine * qo;
-  s->matrix[q][other] = s->matrix[other][q] = sine * po + cosine * qo;
-  for (int i = 0; i < 3; ++i) {
-    const double old = s->direction[p][i];
-    s->direction[p][i] = cosine * old - sine * s->direction[q][i];
-    s->direction[q][i] = sine * old + cosine * s->direction[q][i];
-  }
-  return 1;
-}
-
-static void diagonalise(spectrum* s) {
-  s->trace = s->matrix[0][0] + s->matrix[1][1] + s->matrix[2][2];
-  for (int k = 0; k < 3; ++k) {
-    s->direction[k][k] = 1.0;
-  }
-  for (int sweep = 0, turned = 1; turned && sweep < MAX_SWEEPS; ++sweep) {
-    turned = rotate(s, 0, 1) | rotate(s, 0, 2) | rotate(s, 1, 2);
-  }
-}
 
 /* One weighted least-squares problem: Σ w²·(torque + lever · F)². */
 typedef struct problem {
@@ -75,19 +33,39 @@ static problem pose(size_t joints, const double* lever, const double* torque, co
   return p;
 }
 
-/* the normal equations: matrix, and pull = −Σ w²·lever·torque */
-static void sum_up(const problem* p, spectrum* s, double pull[3]) {
-  *s = (spectrum){.trace = 0.0};
-  pull[0] = pull[1] = pull[2] = 0.0;
-  for (size_t j = 0; j < p->joints; ++j) {
-    const double *lever = p->lever + 3 * j, w = weight(p, j);
-    for (int i = 0; i < 3; ++i) {
-      pull[i] -= w * lever[i] * (w * p->torque[j]);
-      for (int k = 0; k < 3; ++k) {
-        s->matrix[i][k] += w * lever[i] * (w * lever[k]);
-      }
-    }
+/* Σ a_j·b_j over the joints */
+static double dot(size_t joints, const double* a, const double* b) {
+  double sum = 0.0;
+  for (size_t j = 0; j < joints; ++j) {
+    sum += a[j] * b[j];
   }
+  return sum;
+}
+
+/* The problem turned to its principal directions: what a unit of force along each makes of the weighted torques. */
+typedef struct principal {
+  double torque[3 * MODEL_MAX_JOINTS]; /* [3 × joints], orthogonal */
+  double direction[9];                 /* [3 × 3], one a row */
+  double value[3], largest;            /* squared lengths of torque */
+  double pull[3];                      /* of the weighted torques along them */
+} principal;
+
+static principal find_principal(const problem* p) {
+  principal of;
+  double weighted[MODEL_MAX_JOINTS];
+  for (size_t j = 0; j < p->joints; ++j) {
+    for (size_t i = 0; i < 3; ++i) {
+      of.torque[i * p->joints + j] = weight(p, j) * p->lever[3 * j + i];
+    }
+    weighted[j] = weight(p, j) * p->torque[j];
+  }
+  orthogonal_columns(p->joints, 3, of.torque, of.direction);
+  for (size_t k = 0; k < 3; ++k) {
+    of.value[k] = dot(p->joints, of.torque + k * p->joints, of.torque + k * p->joints);
+    of.pull[k] = -dot(p->joints, of.torque + k * p->joints, weighted);
+  }
+  of.largest = fmax(of.value[0], fmax(of.value[1], of.value[2]));
+  return of;
 }
 
 static double least_sum(const problem* p, const double force[3]) {
@@ -102,20 +80,18 @@ static double least_sum(const problem* p, const double force[3]) {
 
 tip_force find_tip_force(size_t joints, const double* lever, const double* torque, const double* deviation) {
   const problem p = pose(joints, lever, torque, deviation);
+  const principal of = find_principal(&p);
+  const double largest = of.largest;
   tip_force found = {.observable = 0};
-  spectrum s;
-  double pull[3], best[3] = {0.0, 0.0, 0.0}, variance[3] = {0.0, 0.0, 0.0};
+  double best[3] = {0.0, 0.0, 0.0}, variance[3] = {0.0, 0.0, 0.0};
   int told = 0;
   size_t turning = 0;
-  sum_up(&p, &s, pull);
-  diagonalise(&s);
-  const double largest = fmax(s.matrix[0][0], fmax(s.matrix[1][1], s.matrix[2][2]));
   for (int k = 0; k < 3; ++k) {
-    const double value = s.matrix[k][k], *e = s.direction[k];
+    const double value = of.value[k], *e = of.direction + 3 * k;
     if (!(value > least_square && value >= turning_share * largest)) {
       continue;
     }
-    const double along = (e[0] * pull[0] + e[1] * pull[1] + e[2] * pull[2]) / value;
+    const double along = of.pull[k] / value;
     const int tells = value >= told_share * largest;
     told += tells;
     ++turning;

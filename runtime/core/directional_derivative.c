@@ -149,18 +149,9 @@ static dual friction_at(const linearisation* l, const effect_laws* laws, size_t 
   return product(grip, scaled(side, magnitude_at(laws, side < 0.0, scaled(side, velocity))));
 }
 
-/* what a place of a tendon loses: friction times what acts there, or what is remembered of it. motion: slope of the
- * travel; before: of the force before the place */
-static dual loss_at(const linearisation* l, size_t slot, size_t row, dual friction, dual acts, double motion,
-                    double before) {
-  const tendonfmu_finger* f = l->finger;
-  const size_t at = row * f->slots + slot;
-  if (!remembers_at(f, slot)) {
-    return product(acts, friction);
-  }
-  const double first = f->remembered.scalar[STATE_FIRST_SAMPLE];
-  const double stretch = f->memory.compliance > 0.0 ? f->memory.sections[slot] * f->memory.compliance * before : 0.0;
-  const double turned = first != 0.0 ? 0.0 : motion + stretch, limit = product(acts, friction).slope;
+/* what is remembered of a place, `at` in rows of edges and pulleys; slopes of its travel and of its limit */
+static dual remembered_loss(const tendonfmu_finger* f, size_t at, double motion, double limit) {
+  const double turned = f->remembered.scalar[STATE_FIRST_SAMPLE] != 0.0 ? 0.0 : motion;
   double force = 0.0;
   for (size_t e = 0; e < f->memory.elements; ++e) {
     force += f->remembered.element[e * 2 * f->slots + at];
@@ -168,15 +159,25 @@ static dual loss_at(const linearisation* l, size_t slot, size_t row, dual fricti
   return (dual){force, f->remembered.by_turning[at] * turned + f->remembered.by_limit[at] * limit};
 }
 
+/* what a place of a tendon loses: friction times what acts there, or what is remembered of it. motion: slope of the
+ * travel; before: of the force before the place */
+static dual loss_at(const linearisation* l, size_t slot, size_t row, dual friction, dual acts, double motion,
+                    double before) {
+  const tendonfmu_finger* f = l->finger;
+  const dual loss = product(acts, friction);
+  if (!remembers_at(f, slot)) {
+    return loss;
+  }
+  const double stretch = f->memory.compliance > 0.0 ? f->memory.sections[slot] * f->memory.compliance * before : 0.0;
+  return remembered_loss(f, row * f->slots + slot, motion + stretch, loss.slope);
+}
+
 /* b of fig. 5 at the last sample */
 static dual bias_at(const linearisation* l, const effect_laws* laws, size_t slot, double threshold, dual velocity) {
   const finger_state* s = &l->finger->remembered;
   const dual speed = {threshold, 0.0};
   const double before = side_before(l->finger, slot), now = s->side[slot];
-  if (s->event[slot] == 0.0) {
-    return (dual){0.0, 0.0};
-  }
-  if (remembers_at(l->finger, slot)) {
+  if (s->event[slot] == 0.0 || remembers_at(l->finger, slot)) {
     return (dual){0.0, 0.0};
   }
   const dual grip = slot_grip(l, slot, velocity);
@@ -255,13 +256,7 @@ static dual own_friction(const linearisation* l, size_t j, dual own, dual load) 
   if (!remembers_at(f, slot)) {
     return both;
   }
-  double force = 0.0;
-  for (size_t e = 0; e < f->memory.elements; ++e) {
-    force += f->remembered.element[e * 2 * f->slots + slot];
-  }
-  const double turned = f->remembered.scalar[STATE_FIRST_SAMPLE] != 0.0 ? 0.0 : l->motion[j];
-  const double limit = both.slope + l->own_limit[j];
-  return (dual){force, f->remembered.by_turning[slot] * turned + f->remembered.by_limit[slot] * limit};
+  return remembered_loss(f, slot, l->motion[j], both.slope + l->own_limit[j]);
 }
 
 static void linearise_joints(linearisation* l) {

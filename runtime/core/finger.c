@@ -310,7 +310,8 @@ tendonfmu_status tendonfmu_step_hand(size_t count, tendonfmu_finger* const* fing
     return TENDONFMU_BAD_ARGUMENT;
   }
   for (size_t k = 0; k < count; ++k) {
-    const tendonfmu_status status = take_with_outputs(fingers[k], time, &inputs[k], outputs ? &outputs[k] : NULL);
+    const char* to = outputs ? (const char*)outputs + k * outputs_size(outputs) : NULL;
+    const tendonfmu_status status = take_with_outputs(fingers[k], time, &inputs[k], (const void*)to);
     if (statuses) {
       statuses[k] = status;
     }

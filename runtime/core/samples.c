@@ -155,9 +155,17 @@ static void give_place(const tendonfmu_finger* finger, const tendonfmu_outputs* 
   }
 }
 
-void samples_give_outputs(const tendonfmu_finger* finger, const tendonfmu_outputs* outputs, size_t row) {
+size_t outputs_size(const tendonfmu_outputs* outputs) {
+  const size_t first_version = offsetof(tendonfmu_outputs, contact_terms) + sizeof outputs->contact_terms;
+  return outputs->size ? outputs->size : first_version;
+}
+
+void samples_give_outputs(const tendonfmu_finger* finger, const tendonfmu_outputs* wanted, size_t row) {
+  tendonfmu_outputs known = {0}; /* to this version and to the program's */
+  const tendonfmu_outputs* outputs = &known;
   const finger_state* s = &finger->remembered;
-  const size_t n = finger->joints;
+  const size_t n = finger->joints, size = outputs_size(wanted);
+  memcpy(&known, wanted, size < sizeof known ? size : sizeof known);
   give_numbers(outputs->compensated_torque, s->compensated, n, row);
   give_numbers(outputs->joint_torque, s->torque, n, row);
   give_numbers(outputs->friction_torque, s->friction, n, row);

@@ -13,7 +13,10 @@ void samples_name_bad_input(const tendonfmu_finger* finger, double time, const t
                             message_line message);
 
 /* Copies the outputs of the last sample into row `row` of the caller's arrays. */
-void samples_give_outputs(const tendonfmu_finger* finger, const tendonfmu_outputs* outputs, size_t row);
+void samples_give_outputs(const tendonfmu_finger* finger, const tendonfmu_outputs* wanted, size_t row);
+
+/* Bytes of the caller's tendonfmu_outputs. */
+size_t outputs_size(const tendonfmu_outputs* outputs);
 
 /* Row `row` of many samples. */
 tendonfmu_inputs samples_row(const tendonfmu_finger* finger, const tendonfmu_inputs* inputs, size_t row);

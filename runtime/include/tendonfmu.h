@@ -132,10 +132,12 @@ tendonfmu_status tendonfmu_run(tendonfmu_finger* finger, size_t samples, const d
                                const tendonfmu_inputs* inputs, const tendonfmu_outputs* outputs, size_t* done);
 
 /* Takes the sample at `time` of every finger of a hand, and copies what it gives. A finger that has taken no sample
- * takes its first one. Where one sample is refused, that finger stays as it was and the others take theirs. fingers
- * [count], each another one inputs        [count], those of finger k outputs       [count], or NULL: not wanted; those
- * of a finger that refuses are left alone statuses      [count] receives what tendonfmu_step() would return of each, or
- * NULL Returns TENDONFMU_OK, or the status of the first finger that refuses. */
+ * takes its first one. Where one sample is refused, that finger stays as it was and the others take theirs.
+ *   fingers       [count], each another one
+ *   inputs        [count], those of finger k
+ *   outputs       [count], or NULL: not wanted; all of the same `size`; those of a finger that refuses are left alone
+ *   statuses      [count] receives what tendonfmu_step() would return of each, or NULL
+ * Returns TENDONFMU_OK, or the status of the first finger that refuses. */
 tendonfmu_status tendonfmu_step_hand(size_t count, tendonfmu_finger* const* fingers, double time,
                                      const tendonfmu_inputs* inputs, const tendonfmu_outputs* outputs,
                                      tendonfmu_status* statuses);

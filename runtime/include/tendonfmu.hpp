@@ -334,6 +334,7 @@ class finger {
   // Without a branch for each output: 25 of them took 9 % of a step.
   bool unpack(const outputs& wanted, std::size_t samples, tendonfmu_outputs& c) const noexcept {
     int wrong = 0;
+    c.size = sizeof c;
     detail::for_each_output(wanted, c, joints_, tendons_,
                             [&](const char*, auto array, auto*& to, std::size_t count) noexcept {
                               to = pointer(array);

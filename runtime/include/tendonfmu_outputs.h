@@ -3,10 +3,14 @@
 #ifndef TENDONFMU_OUTPUTS_H
 #define TENDONFMU_OUTPUTS_H
 
+#include <stddef.h>
+
 /* Outputs of one sample, or of many, of a finger of n joints and m tendons. A NULL array is not wanted. Flags are 0 or 1.
- * Begin with = {0} and set what is wanted by name: later versions add arrays at the end, so a program is compiled with
- * the header of its library. */
+ * Begin with = {0} and set what is wanted by name. Later versions add arrays at the end. Where the library may be of
+ * another version than this header, set size too: then it gives the arrays that both know. */
 typedef struct tendonfmu_outputs {
+  /* sizeof(tendonfmu_outputs) of the program; 0: without the arrays that versions after 0.2 add */
+  size_t size;
   /* [n] N·m: Estimate of the external torque at joint i as the tendons have to hold it: minus the torque on the finger */
   double* compensated_torque;
   /* [n] N·m: Torque of the tendons at joint i, the transposed moment arms times the tendon forces */

@@ -5,6 +5,7 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <cstddef>
 #include <string>
 #include <thread>
 #include <vector>
@@ -46,6 +47,40 @@ std::array<tendonfmu_inputs, fingers> rows(const Motion& motion, std::size_t k) 
     inputs[i] = motion.row(k + 100 * i);  // each finger is elsewhere in the motion
   }
   return inputs;
+}
+
+// A program of a later header: its outputs are longer, and have arrays that this library does not know.
+struct LaterOutputs {
+  tendonfmu_outputs known;
+  double* unknown;
+};
+
+TEST(Hand, GivesProgramsOfOtherHeadersWhatBothKnow) {
+  const Motion motion(1000);
+  Hand hand, whole;
+  double untouched = 7.0;
+  std::array<LaterOutputs, fingers> later = {};
+  for (std::size_t k = 0; k < fingers; ++k) {
+    later[k] = {hand.view[k], &untouched};
+    later[k].known.size = sizeof(LaterOutputs);
+  }
+  const auto inputs = rows(motion, 0);
+  ASSERT_EQ(whole.step(0.0, inputs), TENDONFMU_OK);
+  ASSERT_EQ(tendonfmu_step_hand(fingers, hand.handle.data(), 0.0, inputs.data(), &later[0].known, nullptr),
+            TENDONFMU_OK);
+  for (std::size_t k = 0; k < fingers; ++k) {
+    EXPECT_TRUE(hand.outputs[k] == whole.outputs[k]) << k;
+  }
+  EXPECT_EQ(untouched, 7.0);
+
+  std::vector<double> torque(4, -1.0), friction(4, -1.0);
+  tendonfmu_outputs earlier = {};
+  earlier.size = offsetof(tendonfmu_outputs, friction_torque);
+  earlier.joint_torque = torque.data();
+  earlier.friction_torque = friction.data();
+  ASSERT_EQ(tendonfmu_get_outputs(whole.handle[0], &earlier), TENDONFMU_OK);
+  EXPECT_NE(torque[0], -1.0);
+  EXPECT_EQ(friction[0], -1.0);
 }
 
 TEST(Hand, GivesTheBitsOfItsFingers) {

@@ -1,4 +1,4 @@
-/* A term beyond the paper: one file each, one row each in effect_table.c
+/* A term beyond the paper: a file for those of a kind, one row each in effect_table.c
  * (docs/reference/semantics/effects.md has the text they follow).
  *
  * A term acts in one of three ways: on the signals before the joint angles are known, on the friction values of some
