@@ -153,6 +153,22 @@ def test_numbers_as_names_are_no_row(tmp_path: Path) -> None:
         assert [(part.field.name, part.count) for part in fields] == [(name, ROWS) for name in names]
 
 
+@pytest.mark.parametrize(
+    "lines",
+    [
+        [["", "force", "force"], ["", "m1", "m2"], ["time", "", ""]],  # columns of pandas with two levels
+        [["time", "force", ""], ["", "m1", "m2"]],  # merged cells
+    ],
+)
+def test_repeated_names_are_joined_with_the_lines_above(tmp_path: Path, lines: list[list[str]]) -> None:
+    both = [[*row, *row[1:]] for row in lines]
+    both[0][3:] = ["spool", both[0][2] and "spool"]
+    rows = [[*row, *reversed(row[1:])] for row in CELLS]
+    fields = inspected(tmp_path, joined([*both, *rows])).topics[0].fields
+    names = ["time", "force.m1", "force.m2", "spool.m1", "spool.m2"]
+    assert [(part.field.name, part.count) for part in fields] == [(name, ROWS) for name in names]
+
+
 def test_labview_without_times_wants_a_rate(tmp_path: Path) -> None:
     text = LVM + joined([["X_Value", "force", "spool"], *(["", *row[1:]] for row in CELLS)], "\t").replace(".", ",")
     time = propose(inspected(tmp_path, text, "log.lvm")).lines[0]

@@ -194,6 +194,7 @@ class _Lines:
             number, line = self.content[at]
             names = self.fitted(fields_of(_uncommented(line), self.separator))
             below = [(k, row) for k, row in self.rows if k > number]
+            names = self.with_levels(names, self.content[:at], below[0][1] if below else [])
             if below:
                 is_units = self.is_units(below[0][1], len(names))
                 has_units = is_units if self.log.units_row is None else self.log.units_row
@@ -228,6 +229,22 @@ class _Lines:
                 return ["", *names]
             if all(_MOMENT.fullmatch(row[0]) for row in self.even):
                 return ["time", *names]
+        return names
+
+    def with_levels(self, names: list[str], above: Sequence[tuple[int, str]], below: list[str]) -> list[str]:
+        """Join the lines of names of columns with several levels, as pandas writes them, or cells that are merged."""
+        next_names = [] if len(below) != len(names) or any(map(self.is_number, below)) else below
+        lines = [fields_of(_uncommented(line), self.separator) for _, line in reversed(above)]
+        if next_names and not all(names[1:]) and all(next_names[1:]) and not self.is_units(next_names, len(names)):
+            lines, names, next_names = [names, *lines], next_names, []
+        for upper in lines:
+            given = [name for name in names if name]
+            if len(set(given)) == len(given) or len(upper) != len(names) or any(map(self.is_number, upper)):
+                break
+            for k in range(2, len(upper)):
+                upper[k] = upper[k] or upper[k - 1]
+            names = [".".join(filter(None, levels)) for levels in zip(upper, names, strict=True)]
+            names = [name or own for name, own in zip(names, next_names or names, strict=True)]
         return names
 
     def names_at(self, first: int | None) -> int | None:
