@@ -199,16 +199,16 @@ typedef enum row_condition {
 
 /* Rows of numbers, each with a pointer in struct tendonfmu_finger: all of its memory follows from such. */
 typedef struct finger_row {
-  size_t place, pointers; /* offset of the first pointer; how many side by side */
-  row_unit unit;
-  size_t count; /* of the unit; 0: 1 */
-  row_condition when;
+  uint16_t place, pointers; /* offset of the first pointer; how many side by side */
+  uint16_t count;           /* of the unit; 0: 1 */
+  unsigned char unit;       /* row_unit */
+  unsigned char when;       /* row_condition */
   /* what may stand in a saved state */
+  unsigned char whole;    /* whole numbers only */
+  unsigned char spare;    /* lanes that stand for nothing are tracked along; else they hold 0 */
+  unsigned char together; /* the numbers of one lane stand together, not the lanes of one number */
   double low, high;
-  int whole;                      /* whole numbers only */
-  int spare;                      /* lanes that stand for nothing are tracked along; else they hold 0 */
   const struct finger_row* parts; /* [count] where each has limits of its own */
-  int together;                   /* the numbers of one lane stand together, not the lanes of one number */
 } finger_row;
 
 /* The state in its order. */

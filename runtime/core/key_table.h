@@ -65,9 +65,8 @@ typedef struct key_row {
   const char* path;
   const char* unit; /* FMI notation */
   double minimum, maximum;
-  int above_minimum; /* the minimum itself is not allowed */
-  int tunable;
-  int has_default;
+  unsigned char above_minimum; /* the minimum itself is not allowed */
+  unsigned char tunable, has_default;
   double default_value;
   key_count count;
   uint32_t option; /* the bit of the model image (model_options.h) without which it is not there; 0: always there */
