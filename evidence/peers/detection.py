@@ -1,6 +1,6 @@
 """Pushes that each tool finds on a finger of evidence/contact, at as many false alarms in free motion as TendonFMU has.
 
-All learn on FREE. Thresholds of the others are the lowest with that number on MORE; the pushes judge, and chose nothing.
+All learn on FREE. Thresholds of the others are the lowest with that number on MORE; pushes judge and chose nothing.
 """
 
 from __future__ import annotations

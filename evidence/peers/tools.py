@@ -93,21 +93,10 @@ def terms(case: Case, signals: Signals, j: int, width: float) -> Numbers:
     velocity = signals.velocity[:, j]
     sign = np.tanh(velocity / width)
     load = np.abs(signals.force) @ np.abs(case.arms[:, j])
-    angle = np.cumsum(signals.angle, axis=1)[:, j:] if case.chain else sums(signals.angle)
+    angle = np.cumsum(signals.angle, axis=1)[:, j:] if case.chain else signals.angle
     others = np.delete(signals.acceleration, j, axis=1)
     always = [sign, sign * load, velocity, signals.acceleration[:, j], np.ones_like(sign), signals.angle[:, j]]
     return np.column_stack([*always, np.sin(angle), np.cos(angle), others])
-
-
-def sums(angle: Numbers) -> Numbers:
-    """Angles, and the sums and differences of each two: their sines are all products that the weight of an arm has."""
-    pairs = [
-        angle[:, i : i + 1] + sign * angle[:, j : j + 1]
-        for j in range(angle.shape[1])
-        for i in range(j)
-        for sign in (1, -1)
-    ]
-    return np.hstack([angle, *pairs])
 
 
 # --- boosted trees ----------------------------------------------------------------------------------------------------
