@@ -33,16 +33,13 @@ def _of_mujoco(name: str) -> Callable[[Case], tools.Error]:
     return learn
 
 
-ROLLOUT = "mujoco.sysid, rollout"
 TOOLS: Mapping[str, Callable[[Case], tools.Error]] = {
     "TendonFMU": tools.tendonfmu,
-    ROLLOUT: _of_mujoco("rollout"),
     "mujoco.sysid, inverse dynamics": _of_mujoco("inverse"),
     "the same, pulleys by load": _of_mujoco("inverse_by_load"),
     "Coulomb, viscous, load": tools.regression,
     "boosted trees": tools.trees,
 }
-SPRINGS = NAMES[:3]  # a rollout predicts forces by the springs of tendons
 
 
 def job_name(*parts: str) -> str:
@@ -71,7 +68,7 @@ def pushed(folder: Path, detector: str) -> Row:
 def measure(folder: Path, workers: int) -> Figures:
     from evidence.peers import detection
 
-    pairs = [(name, tool) for name in NAMES for tool in TOOLS if tool != ROLLOUT or name in SPRINGS]
+    pairs = [(name, tool) for name in NAMES for tool in TOOLS]
     rows = run_cases(learned, {job_name(*pair): (folder, *pair) for pair in pairs}, folder, workers)
     jobs = {job_name("detection", name): (folder, name) for name in detection.DETECTORS}
     found = [pushes_by_size(row) for row in run_cases(pushed, jobs, folder, workers)]

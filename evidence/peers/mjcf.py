@@ -1,8 +1,8 @@
 """mujoco.sysid with the MJCF that a user would have: hinges, links, tendons over pulleys, all numbers that MJCF has.
 
 A link is a mass at a place to be found, on a chain of hinges: its weight and inertia are all that the torques show of
-lengths. Each tendon is one of springs from the motor to its last joint, and, of each pulley that it passes, one with
-the friction there. All numbers start from the description that TendonFMU has, too, and have generous bounds.
+lengths. Each pulley that a tendon passes is a tendon of MuJoCo with the friction there. All numbers start from the
+description that TendonFMU has, too, and have generous bounds.
 """
 
 from __future__ import annotations
@@ -18,15 +18,13 @@ import numpy as np
 from mujoco import sysid
 from scipy import optimize
 
-import tendonfmu as tf
-from evidence.peers.signals import Case, Signals, signals_of
+from evidence.peers.signals import Case, Signals
 from evidence.peers.tools import Error, Predict, error_by, learned_signals
 from tendonfmu.arrays import Numbers
 
 STEP = 0.002  # s
 ITERATIONS = 10
 SAMPLES = 600  # that inverse dynamics learn from, evenly spread
-STRETCH, APART = 2.0, 15.0  # s of each rollout, and from one to the next: longer ones forget where they began
 
 Set = Callable[[Any, float], None]
 
@@ -37,7 +35,7 @@ def passes(case: Case) -> list[tuple[int, int]]:
 
 
 def mjcf(case: Case) -> str:
-    m, n = case.arms.shape
+    n = case.arms.shape[1]
     links = [
         f'<body name="link_{j}"><joint name="joint_{j}" axis="0 1 0" armature="1e-5"/>'
         '<inertial pos="0 0 0" mass="1" diaginertia="1e-6 1e-6 1e-6"/>'
@@ -50,23 +48,18 @@ def mjcf(case: Case) -> str:
         wraps = "".join(f'<joint joint="joint_{j}" coef="{case.arms[i, j]}"/>' for j in joints if case.arms[i, j])
         return f'<fixed name="{name}">{wraps}</fixed>'
 
-    cords = "".join(tendon(f"tendon_{i}", i, range(n)) for i in range(m))
     pulleys = "".join(tendon(f"pulley_{i}_{j}", i, range(j, n)) for i, j in passes(case))
-    motors = "".join(f'<position name="motor_{i}" tendon="tendon_{i}" kp="{case.stiffness[i]}"/>' for i in range(m))
-    sensors = "".join(f'<jointpos joint="joint_{j}"/>' for j in range(n))
-    sensors += "".join(f'<actuatorfrc actuator="motor_{i}"/>' for i in range(m))
     return f"""
-<mujoco><compiler angle="radian"/><option timestep="{STEP}" integrator="implicitfast" gravity="0 0 -9.81"/>
-  <worldbody>{body}</worldbody><tendon>{cords}{pulleys}</tendon>
-  <actuator>{motors}</actuator><sensor>{sensors}</sensor>
+<mujoco><compiler angle="radian"/><option timestep="{STEP}" gravity="0 0 -9.81"/>
+  <worldbody>{body}</worldbody><tendon>{pulleys}</tendon>
 </mujoco>"""
 
 
 # --- numbers ----------------------------------------------------------------------------------------------------------
 
 
-def unknowns(case: Case, load: Numbers, by_load: bool, level: bool) -> sysid.ParameterDict:
-    """All numbers, each in a unit of its own size. load: [m] N, mean of each tendon; level: a mean counts."""
+def unknowns(case: Case, load: Numbers, by_load: bool) -> sysid.ParameterDict:
+    """All numbers, each in a unit of its own size. load: [m] N, mean of each tendon."""
     found = sysid.ParameterDict()
 
     def add(name: str, start: float, low: float, high: float, put: Callable[[Any, float], None]) -> None:
@@ -76,11 +69,9 @@ def unknowns(case: Case, load: Numbers, by_load: bool, level: bool) -> sysid.Par
 
     for j, described in enumerate(case.finger["joints"]):
         cover, friction = described.get("cover", {}), described["friction"]
-        stiffness, rest = cover.get("stiffness", 0.0), cover.get("rest_angle", 0.0)
+        stiffness = cover.get("stiffness", 0.0)
         reach = max(stiffness, friction["coulomb"])
         add(f"cover_{j}", stiffness, -5 * reach, 5 * reach, partial(put_stiffness, joint=f"joint_{j}"))
-        if level:
-            add(f"rest_{j}", rest, -1.0, 1.0, partial(put, kind="joint", name=f"joint_{j}", key="springref"))
         add(
             f"friction_{j}",
             friction["coulomb"],
@@ -177,12 +168,11 @@ def inverted(case: Case, signals: Signals, by_load: bool) -> Predict:
 
     def torque(model: Any, given: Signals) -> Numbers:
         data, share = mujoco.MjData(model), model.tendon_frictionloss.copy()
-        made, m = np.empty_like(given.torque), case.arms.shape[0]
+        made = np.empty_like(given.torque)
         for k in range(len(made)):
             if by_load:
-                model.tendon_frictionloss[m:] = share[m:] * np.abs(given.force[k, owner])
+                model.tendon_frictionloss[:] = share * np.abs(given.force[k, owner])
             data.qpos, data.qvel, data.qacc = given.angle[k], given.velocity[k], given.acceleration[k]
-            data.ctrl = case.arms @ given.angle[k]  # the motors pull nothing
             mujoco.mj_inverse(model, data)
             made[k] = data.qfrc_inverse
         model.tendon_frictionloss[:] = share
@@ -196,57 +186,7 @@ def inverted(case: Case, signals: Signals, by_load: bool) -> Predict:
             columns.append(((made - made.mean(axis=0) - wanted) / wanted.std(axis=0)).ravel())
         return [columns[0] if x.ndim == 1 else np.column_stack(columns)], None, None
 
-    start = unknowns(case, np.abs(signals.force).mean(axis=0), by_load, level=False)
+    start = unknowns(case, np.abs(signals.force).mean(axis=0), by_load)
     found = solved(start, residual)
     model = sysid.apply_param_modifiers(found, spec)
     return lambda given: torque(model, given)
-
-
-# --- by rollouts ------------------------------------------------------------------------------------------------------
-
-
-def rollout(case: Case) -> Error:
-    """As documented: motors are moved as measured, angles and tendon forces are compared, and predicted afterwards."""
-    spec = mujoco.MjSpec.from_string(mjcf(case))
-    signals = [signals_of(case, recording) for recording in case.learned]
-    starts = [sequence for part in signals for sequence in stretches(part)]
-    model = spec.compile()
-    states, controls, measured = zip(*(series(model, part) for part in starts), strict=True)
-    names = [f"stretch_{k}" for k in range(len(starts))]
-    group = sysid.ModelSequences("finger", spec, names, list(states), list(controls), list(measured))
-    residual = sysid.build_residual_fn(models_sequences=[group])
-    start = unknowns(case, np.abs(Signals.joined(signals).force).mean(axis=0), by_load=False, level=True)
-    for i, stiffness in enumerate(case.stiffness):
-        unit = stiffness / 10.0
-        start.add(
-            sysid.Parameter(f"spring_{i}", 10.0, 5.0, 20.0, modifier=partial(put_spring, motor=f"motor_{i}", unit=unit))
-        )
-    found = solved(start, residual)
-    best = sysid.apply_param_modifiers(found, spec)
-
-    def error(recording: tf.Recording) -> Numbers:
-        given = signals_of(case, recording)
-        state, control, _ = series(best, given)
-        (made,) = sysid.sysid_rollout(best, mujoco.MjData(best), control.resample(target_dt=STEP), state)
-        force = np.asarray(made.sensordata.resample(given.time).data)[:, -case.arms.shape[0] :]
-        return given.torque - force @ case.arms
-
-    return error
-
-
-def put_spring(spec: Any, own: sysid.Parameter, motor: str, unit: float) -> None:
-    sysid.apply_pgain(spec, motor, unit * float(own.value[0]))
-
-
-def stretches(signals: Signals) -> list[Signals]:
-    starts = np.arange(signals.time[0], signals.time[-1] - STRETCH, APART)
-    rows = [slice(*np.searchsorted(signals.time, (start, start + STRETCH))) for start in starts]
-    return [signals.rows(part) for part in rows]
-
-
-def series(model: Any, signals: Signals) -> tuple[Numbers, sysid.TimeSeries, sysid.TimeSeries]:
-    """State at the beginning, motors, and what is compared."""
-    time = signals.time - signals.time[0]
-    state = sysid.create_initial_state(model, signals.angle[0], signals.velocity[0])
-    seen = np.hstack([signals.angle, signals.force])
-    return state, sysid.TimeSeries(time, signals.motor), sysid.TimeSeries.from_names(time, seen, model)
