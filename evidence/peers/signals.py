@@ -34,7 +34,7 @@ class Case:
     unseen: Sequence[tf.Recording]
     kinematics: int = 2  # of TendonFMU: 1 without measured angles
     chain: bool = True  # weights of links act on all joints before them
-    calibrated: bool = True  # by `tendonfmu calibrate`; else by `tendonfmu fit`: a machine without pretension
+    calibrated: bool = True  # by `tendonfmu calibrate`; else by `diagnose`: a machine without pretension
 
     @property
     def arms(self) -> Numbers:

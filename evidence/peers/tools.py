@@ -31,11 +31,11 @@ def error_by(case: Case, predict: Predict) -> Error:
 
 
 def tendonfmu(case: Case) -> Error:
-    """What `tendonfmu calibrate` delivers, or `fit`, with its bias added again: no other tool follows an offset."""
+    """What `calibrate` delivers, or `diagnose`, with its bias added again: no other tool follows an offset."""
     if case.calibrated:
         finger = tf.calibrate(case.finger, list(case.learned), kinematics=case.kinematics).finger
     else:
-        finger = tf.fit(case.finger, list(case.learned), kinematics=case.kinematics).finger
+        finger = tf.diagnose(case.finger, list(case.learned), kinematics=case.kinematics).extended
 
     def error(recording: tf.Recording) -> Numbers:
         outputs = tf.run(finger, recording, kinematics=case.kinematics).outputs
