@@ -69,7 +69,7 @@ class Signals:
 
 
 def signals_of(case: Case, recording: tf.Recording, rate: float = RATE) -> Signals:
-    """Filtered, with derivatives, at a rate; where no angle was measured it follows from motors and springs."""
+    """Filtered, with derivatives, at a rate; an angle that was not measured follows from motors and springs."""
     groups, step = recording.groups, float(np.median(np.diff(recording.time)))
     force = groups["tendon_force"]
     motor = groups.get("tendon_position", np.zeros_like(force))
@@ -77,7 +77,8 @@ def signals_of(case: Case, recording: tf.Recording, rate: float = RATE) -> Signa
     if angle is None:
         angle = np.linalg.lstsq(case.arms, (motor - force / case.stiffness).T, rcond=None)[0].T
     angle, force, motor = (filtered(values, step) for values in (angle, force, motor))
-    velocity = np.gradient(angle, step, axis=0)
+    measured = groups.get("joint_velocity")
+    velocity = np.gradient(angle, step, axis=0) if measured is None else filtered(measured, step)
     torque = force @ case.arms - filtered(known_load(recording, angle), step)
     late = [round(lag / step) for lag in LAGS]
     history = np.hstack([delayed(values, rows) for values in (angle, velocity) for rows in late])
