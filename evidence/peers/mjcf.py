@@ -8,19 +8,21 @@ description that TendonFMU has, too, and have generous bounds.
 from __future__ import annotations
 
 import contextlib
+import importlib
 import io
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
-import mujoco
 import numpy as np
-from mujoco import sysid
 from scipy import optimize
 
 from evidence.peers.signals import Case, Signals
 from evidence.peers.tools import Error, Predict, error_by, learned_signals
 from tendonfmu.arrays import Numbers
+
+mujoco: Any = importlib.import_module("mujoco")
+sysid: Any = importlib.import_module("mujoco.sysid")  # mypy would take its stubs for those of mujoco
 
 STEP = 0.002  # s
 ITERATIONS = 10
@@ -58,7 +60,7 @@ def mjcf(case: Case) -> str:
 # --- numbers ----------------------------------------------------------------------------------------------------------
 
 
-def unknowns(case: Case, load: Numbers, by_load: bool) -> sysid.ParameterDict:
+def unknowns(case: Case, load: Numbers, by_load: bool) -> Any:
     """All numbers, each in a unit of its own size. load: [m] N, mean of each tendon."""
     found = sysid.ParameterDict()
 
@@ -127,7 +129,7 @@ def put_hardness(spec: Any, value: float) -> None:
         part.solref_friction[0] = 2.0 * STEP
 
 
-def solved(start: sysid.ParameterDict, residual: Callable[..., Any]) -> sysid.ParameterDict:
+def solved(start: Any, residual: Callable[..., Any]) -> Any:
     """By the fastest of its optimizers, which prints every step, from the best linear step: most numbers act so."""
     low, high = start.get_bounds()
     x, parameters = start.as_vector(), start.copy()
@@ -178,7 +180,7 @@ def inverted(case: Case, signals: Signals, by_load: bool) -> Predict:
         model.tendon_frictionloss[:] = share
         return made
 
-    def residual(x: Numbers, parameters: sysid.ParameterDict) -> tuple[list[Numbers], None, None]:
+    def residual(x: Numbers, parameters: Any) -> tuple[list[Numbers], None, None]:
         columns = []
         for column in np.atleast_2d(x.T):
             parameters.update_from_vector(column)

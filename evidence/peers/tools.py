@@ -142,7 +142,7 @@ def allowed(case: Case, force: Numbers) -> Numbers:
     if any("external_torque" in recording.groups for recording in case.learned):
         return force
     pulls, _, _ = np.linalg.svd(case.arms)
-    return force @ pulls[:, case.arms.shape[1] :]
+    return np.asarray(force @ pulls[:, case.arms.shape[1] :])
 
 
 def rms_unseen(error: Error, unseen: Sequence[tf.Recording]) -> Numbers:
