@@ -155,6 +155,15 @@ PARTS = {
         measure,
         minutes=15.0,
         needs=("../shared/data", "mujoco", "sklearn", "absl", "colorama", "imageio", "tabulate"),
+        headlines={  # mN·m of TendonFMU at the first joint, and pushes of at least 10 mN·m that it finds
+            "rows.0.rms.0": (0.0, 1.5),
+            "rows.5.rms.0": (0.0, 2.0),
+            "rows.10.rms.0": (0.0, 5.5),
+            "rows.15.rms.0": (0.0, 5.5),
+            "rows.20.rms.0": (0.0, 150.0),
+            "pushes.0.sizes.10–30.0": (20, 22),
+            "pushes.0.sizes.≥ 30.0": (27, 28),
+        },
         tables={"errors": error_table, "cost": cost_table, "pushes": push_table},
     )
 }
