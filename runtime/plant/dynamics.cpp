@@ -7,7 +7,6 @@
 #include <cstring>
 
 #include "motion.h"
-#include "site_law.h"
 
 namespace tendonfmu::plant {
 namespace {

@@ -9,7 +9,7 @@
 #include <new>
 #include <utility>
 
-#include "sentence.h"
+#include "description_error.h"
 
 namespace tendonfmu::plant {
 namespace {
