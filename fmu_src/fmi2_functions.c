@@ -1,6 +1,8 @@
-/* FMI 2.0, creation, life cycle, steps and their status. */
+/* FMI 2.0: each function hands its arguments to one that serves both versions. */
+#include "derivatives.h"
 #include "fmi2Functions.h"
-#include "life_cycle.h"
+#include "states.h"
+#include "values.h"
 
 /* --- inquiry and logging ------------------------------------------------------------------------------------------ */
 
@@ -141,4 +143,69 @@ fmi2Status fmi2GetBooleanStatus(fmi2Component instance, const fmi2StatusKind kin
 fmi2Status fmi2GetStringStatus(fmi2Component instance, const fmi2StatusKind kind, fmi2String* value) {
   (void)kind;
   return begin_status(instance, CALL_GET_STRING_STATUS, value, 0);
+}
+
+/* --- variables: fmi2Integer and fmi2Boolean are int, and a value reference is one number -------------------------- */
+
+#define ACCESS(type, CODE, FORMAT)                                                                                   \
+  fmi2Status fmi2Get##type(fmi2Component instance, const fmi2ValueReference vr[], size_t nvr, fmi2##type value[]) {  \
+    return (fmi2Status)values_get(instance, CALL_GET_##CODE, VARIABLE_##CODE, vr, nvr, VALUES_##FORMAT, value, nvr); \
+  }                                                                                                                  \
+  fmi2Status fmi2Set##type(fmi2Component instance, const fmi2ValueReference vr[], size_t nvr,                        \
+                           const fmi2##type value[]) {                                                               \
+    return (fmi2Status)values_set(instance, CALL_SET_##CODE, VARIABLE_##CODE, vr, nvr, VALUES_##FORMAT, value, nvr); \
+  }
+
+ACCESS(Real, REAL, DOUBLE)
+ACCESS(Integer, INTEGER, INT)
+ACCESS(Boolean, BOOLEAN, INT)
+
+fmi2Status fmi2GetString(fmi2Component instance, const fmi2ValueReference vr[], size_t nvr, fmi2String value[]) {
+  return (fmi2Status)values_refuse(instance, CALL_GET_STRING, "String", vr, nvr, value);
+}
+
+fmi2Status fmi2SetString(fmi2Component instance, const fmi2ValueReference vr[], size_t nvr, const fmi2String value[]) {
+  return (fmi2Status)values_refuse(instance, CALL_SET_STRING, "String", vr, nvr, value);
+}
+
+/* --- derivatives -------------------------------------------------------------------------------------------------- */
+
+fmi2Status fmi2GetDirectionalDerivative(fmi2Component instance, const fmi2ValueReference vUnknown_ref[],
+                                        size_t nUnknown, const fmi2ValueReference vKnown_ref[], size_t nKnown,
+                                        const fmi2Real dvKnown[], fmi2Real dvUnknown[]) {
+  const partials p = {.unknowns = {vUnknown_ref, nUnknown},
+                      .knowns = {vKnown_ref, nKnown},
+                      .seed = dvKnown,
+                      .sensitivity = dvUnknown,
+                      .seed_count = nKnown,
+                      .sensitivity_count = nUnknown};
+  return (fmi2Status)derivatives_directional(instance, &p);
+}
+
+/* --- states ------------------------------------------------------------------------------------------------------- */
+
+fmi2Status fmi2GetFMUstate(fmi2Component instance, fmi2FMUstate* FMUstate) {
+  return (fmi2Status)states_get(instance, FMUstate);
+}
+
+fmi2Status fmi2SetFMUstate(fmi2Component instance, fmi2FMUstate FMUstate) {
+  return (fmi2Status)states_set(instance, FMUstate);
+}
+
+fmi2Status fmi2FreeFMUstate(fmi2Component instance, fmi2FMUstate* FMUstate) {
+  return (fmi2Status)states_free(instance, FMUstate);
+}
+
+fmi2Status fmi2SerializedFMUstateSize(fmi2Component instance, fmi2FMUstate FMUstate, size_t* size) {
+  return (fmi2Status)states_serialized_size(instance, FMUstate, size);
+}
+
+fmi2Status fmi2SerializeFMUstate(fmi2Component instance, fmi2FMUstate FMUstate, fmi2Byte serializedState[],
+                                 size_t size) {
+  return (fmi2Status)states_serialize(instance, FMUstate, serializedState, size);
+}
+
+fmi2Status fmi2DeSerializeFMUstate(fmi2Component instance, const fmi2Byte serializedState[], size_t size,
+                                   fmi2FMUstate* FMUstate) {
+  return (fmi2Status)states_deserialize(instance, serializedState, size, FMUstate);
 }
