@@ -6,8 +6,7 @@
 
 namespace tendonfmu::estimation {
 
-/* --- a finger without contact ---------------------------------------------------------------------------------------
- */
+/* --- a finger without contact ------------------------------------------------------------------------------------- */
 
 free_finger::free_finger(const void* image, std::size_t image_size) {
   char message[ERROR_BYTES] = "";
@@ -82,8 +81,7 @@ bool remembers_numbers(const tendonfmu_finger* finger) {
   return finger->extensions.signals + finger->extensions.friction + finger->memory.elements > 0;
 }
 
-/* --- recordings -----------------------------------------------------------------------------------------------------
- */
+/* --- recordings --------------------------------------------------------------------------------------------------- */
 
 namespace {
 

@@ -6,8 +6,7 @@
 
 namespace tendonfmu::estimation {
 
-/* --- where the laws stand --------------------------------------------------------------------------------------------
- */
+/* --- where the laws stand ----------------------------------------------------------------------------------------- */
 
 namespace {
 
@@ -65,9 +64,7 @@ placed_laws::placed_laws(const unknown_list& unknowns, const tendonfmu_finger* f
   model_visit(&finger->shape, add_item, &search);
 }
 
-/* --- what a sample says
- * ------------------------------------------------------------------------------------------------
- */
+/* --- what a sample says ------------------------------------------------------------------------------------------- */
 
 constexpr double nearly_slips = 1.0 - 1e-9; /* of a limit: rounding */
 
@@ -103,8 +100,7 @@ bool sample_rows::sees_event() const {
   return std::any_of(event, event + finger_->slots, [](double each) { return each != 0.0; });
 }
 
-/* --- what F and b depend on -----------------------------------------------------------------------------------------
- */
+/* --- what F and b depend on --------------------------------------------------------------------------------------- */
 
 /* whether the friction of a slot remembers (docs/reference/semantics/presliding.md) */
 bool sample_rows::remembers(std::size_t slot) const {
@@ -245,8 +241,7 @@ double sample_rows::read_jump(const friction_place& p) {
   return jump;
 }
 
-/* --- what F does to the torques -------------------------------------------------------------------------------------
- */
+/* --- what F does to the torques ----------------------------------------------------------------------------------- */
 
 /* the forces along one tendon, from what it lost at each place */
 void sample_rows::follow_forces(std::size_t tendon) {
@@ -362,8 +357,7 @@ void sample_rows::read_joint(std::size_t joint) {
   }
 }
 
-/* --- all of a sample ------------------------------------------------------------------------------------------------
- */
+/* --- all of a sample ---------------------------------------------------------------------------------------------- */
 
 void sample_rows::read() {
   terms_.clear();
