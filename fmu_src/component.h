@@ -53,6 +53,12 @@ fmu_status component_begin_trial(component* c, fmu_function function);
 /* While waiting: brings the outputs up to the present inputs; to 0 with FMU_WARNING. */
 fmu_status component_update_outputs(component* c, fmu_function function);
 
+/* Defines a function of FMI that hands its arguments on. */
+#define FMI_CALL(status, function, parameters, call) \
+  status function parameters {                       \
+    return (status)call;                             \
+  }
+
 /* --- life --------------------------------------------------------------------------------------------------------- */
 
 /* What the functions of both versions of FMI do; the caller adds types and arguments of its own version. */

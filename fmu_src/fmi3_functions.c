@@ -11,10 +11,9 @@ const char* fmi3GetVersion(void) {
   return fmi3Version;
 }
 
-fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean loggingOn, size_t nCategories,
-                               const fmi3String categories[]) {
-  return (fmi3Status)life_set_logging(instance, loggingOn, nCategories, categories);
-}
+FMI_CALL(fmi3Status, fmi3SetDebugLogging,
+         (fmi3Instance instance, fmi3Boolean loggingOn, size_t nCategories, const fmi3String categories[]),
+         life_set_logging(instance, loggingOn, nCategories, categories))
 
 static void send_message(const log_target* target, fmu_status status, const char* category, const char* text) {
   const fmi3LogMessageCallback log_message = (fmi3LogMessageCallback)target->logger;
@@ -92,17 +91,9 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolera
   return (fmi3Status)(status == FMU_OK ? life_enter_initialisation(instance) : status);
 }
 
-fmi3Status fmi3ExitInitializationMode(fmi3Instance instance) {
-  return (fmi3Status)life_exit_initialisation(instance);
-}
-
-fmi3Status fmi3Terminate(fmi3Instance instance) {
-  return (fmi3Status)life_terminate(instance);
-}
-
-fmi3Status fmi3Reset(fmi3Instance instance) {
-  return (fmi3Status)life_reset(instance);
-}
+FMI_CALL(fmi3Status, fmi3ExitInitializationMode, (fmi3Instance instance), life_exit_initialisation(instance))
+FMI_CALL(fmi3Status, fmi3Terminate, (fmi3Instance instance), life_terminate(instance))
+FMI_CALL(fmi3Status, fmi3Reset, (fmi3Instance instance), life_reset(instance))
 
 static void put_flag(fmi3Boolean* flag) {
   if (flag) {
@@ -158,25 +149,20 @@ ACCESS(Boolean, BOOLEAN, BOOL)
 OTHER_TYPES(REFUSE_TYPE)
 REFUSE_TYPE(STRING, String)
 
-fmi3Status fmi3GetBinary(fmi3Instance instance, const fmi3ValueReference references[], size_t count, size_t sizes[],
-                         fmi3Binary values[], size_t value_count) {
-  return (fmi3Status)values_refuse(instance, CALL_GET_BINARY, "Binary", references, count, values);
-}
-
-fmi3Status fmi3SetBinary(fmi3Instance instance, const fmi3ValueReference references[], size_t count,
-                         const size_t sizes[], const fmi3Binary values[], size_t value_count) {
-  return (fmi3Status)values_refuse(instance, CALL_SET_BINARY, "Binary", references, count, values);
-}
-
-fmi3Status fmi3GetClock(fmi3Instance instance, const fmi3ValueReference references[], size_t count,
-                        fmi3Clock values[]) {
-  return (fmi3Status)values_refuse(instance, CALL_GET_CLOCK, "Clock", references, count, values);
-}
-
-fmi3Status fmi3SetClock(fmi3Instance instance, const fmi3ValueReference references[], size_t count,
-                        const fmi3Clock values[]) {
-  return (fmi3Status)values_refuse(instance, CALL_SET_CLOCK, "Clock", references, count, values);
-}
+FMI_CALL(fmi3Status, fmi3GetBinary,
+         (fmi3Instance instance, const fmi3ValueReference references[], size_t count, size_t sizes[],
+          fmi3Binary values[], size_t value_count),
+         values_refuse(instance, CALL_GET_BINARY, "Binary", references, count, values))
+FMI_CALL(fmi3Status, fmi3SetBinary,
+         (fmi3Instance instance, const fmi3ValueReference references[], size_t count, const size_t sizes[],
+          const fmi3Binary values[], size_t value_count),
+         values_refuse(instance, CALL_SET_BINARY, "Binary", references, count, values))
+FMI_CALL(fmi3Status, fmi3GetClock,
+         (fmi3Instance instance, const fmi3ValueReference references[], size_t count, fmi3Clock values[]),
+         values_refuse(instance, CALL_GET_CLOCK, "Clock", references, count, values))
+FMI_CALL(fmi3Status, fmi3SetClock,
+         (fmi3Instance instance, const fmi3ValueReference references[], size_t count, const fmi3Clock values[]),
+         values_refuse(instance, CALL_SET_CLOCK, "Clock", references, count, values))
 
 /* --- derivatives -------------------------------------------------------------------------------------------------- */
 
@@ -196,28 +182,14 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueRefere
 
 /* --- states ------------------------------------------------------------------------------------------------------- */
 
-fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState* FMUState) {
-  return (fmi3Status)states_get(instance, FMUState);
-}
-
-fmi3Status fmi3SetFMUState(fmi3Instance instance, fmi3FMUState FMUState) {
-  return (fmi3Status)states_set(instance, FMUState);
-}
-
-fmi3Status fmi3FreeFMUState(fmi3Instance instance, fmi3FMUState* FMUState) {
-  return (fmi3Status)states_free(instance, FMUState);
-}
-
-fmi3Status fmi3SerializedFMUStateSize(fmi3Instance instance, fmi3FMUState FMUState, size_t* size) {
-  return (fmi3Status)states_serialized_size(instance, FMUState, size);
-}
-
-fmi3Status fmi3SerializeFMUState(fmi3Instance instance, fmi3FMUState FMUState, fmi3Byte serializedState[],
-                                 size_t size) {
-  return (fmi3Status)states_serialize(instance, FMUState, serializedState, size);
-}
-
-fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte serializedState[], size_t size,
-                                   fmi3FMUState* FMUState) {
-  return (fmi3Status)states_deserialize(instance, serializedState, size, FMUState);
-}
+FMI_CALL(fmi3Status, fmi3GetFMUState, (fmi3Instance instance, fmi3FMUState* FMUState), states_get(instance, FMUState))
+FMI_CALL(fmi3Status, fmi3SetFMUState, (fmi3Instance instance, fmi3FMUState FMUState), states_set(instance, FMUState))
+FMI_CALL(fmi3Status, fmi3FreeFMUState, (fmi3Instance instance, fmi3FMUState* FMUState), states_free(instance, FMUState))
+FMI_CALL(fmi3Status, fmi3SerializedFMUStateSize, (fmi3Instance instance, fmi3FMUState FMUState, size_t* size),
+         states_serialized_size(instance, FMUState, size))
+FMI_CALL(fmi3Status, fmi3SerializeFMUState,
+         (fmi3Instance instance, fmi3FMUState FMUState, fmi3Byte serializedState[], size_t size),
+         states_serialize(instance, FMUState, serializedState, size))
+FMI_CALL(fmi3Status, fmi3DeserializeFMUState,
+         (fmi3Instance instance, const fmi3Byte serializedState[], size_t size, fmi3FMUState* FMUState),
+         states_deserialize(instance, serializedState, size, FMUState))

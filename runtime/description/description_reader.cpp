@@ -442,35 +442,16 @@ double read_value(const json_node& document, const model_item& item, std::uint32
   node.refuse("a number, " + std::string(range));
 }
 
-/* No exception may pass through the C code that calls visit(), so one is carried around it. */
-struct reading {
-  const json_node& document;
-  std::vector<double> values;
-  std::exception_ptr failure;
-};
-
-int visit(void* context, const model_item* item) {
-  reading& r = *static_cast<reading*>(context);
-  try {
-    for (std::uint32_t i = item->first; i < item->first + item->count; ++i) {
-      r.values[i] = read_value(r.document, *item, i);
-    }
-    return 0;
-  } catch (...) {
-    r.failure = std::current_exception();
-    return -1;
-  }
-}
-
 /* values of all parameters [parameter_count] in the core's order, each found in the document under the core's path for
  * it; defaults where it is absent. Not checked against the ranges. */
 std::vector<double> read_values(const json_node& document, const model_shape& shape) {
-  reading r{document, std::vector<double>(shape.parameter_count), nullptr};
-  model_visit(&shape, visit, &r);
-  if (r.failure) {
-    std::rethrow_exception(r.failure);
-  }
-  return r.values;
+  std::vector<double> values(shape.parameter_count);
+  visit_items(shape, [&](const model_item& item) {
+    for (std::uint32_t i = item.first; i < item.first + item.count; ++i) {
+      values[i] = read_value(document, item, i);
+    }
+  });
+  return values;
 }
 
 /* --- the interface --------------------------------------------------------------------------------------------------
