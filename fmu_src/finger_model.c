@@ -21,8 +21,8 @@ const model_texts model_text = {.resource = "model.image",
 
 model* model_create(const void* resource, size_t size, int at_end, log_text* reason) {
   model* m = calloc(1, sizeof *m);
-  *reason = log_line("out of memory");
   if (!m) {
+    *reason = log_line("out of memory");
     return NULL;
   }
   m->finger = tendonfmu_create(resource, size, reason->bytes, sizeof reason->bytes);
@@ -41,6 +41,7 @@ model* model_create(const void* resource, size_t size, int at_end, log_text* rea
   m->changed_indices = malloc((m->shape.parameters + 1) * sizeof *m->changed_indices);
   m->changed_values = malloc((m->shape.parameters + 1) * sizeof *m->changed_values);
   if (!m->scratch || !m->changed_indices || !m->changed_values) {
+    *reason = log_line("out of memory");
     model_destroy(m);
     return NULL;
   }
