@@ -28,13 +28,7 @@ typedef struct component {
   double refused_at;      /* s */
 } component;
 
-/* Takes over the model and a copy of the name; identity: component_identity(). NULL when memory is out; the model is
- * then destroyed. */
-component* component_create(const log_target* log, model* m, uint64_t identity);
 void component_destroy(component* c);
-
-/* Back to what component_create() gave; logging stays as it is set. */
-void component_reset(component* c);
 
 /* There was no discarded step. */
 void component_forget_steps(component* c);
@@ -52,12 +46,39 @@ fmu_status component_fail(component* c, const char* function, const char* format
 /* The same with the model's words. */
 fmu_status component_fail_as_model(component* c, fmu_function function);
 
-/* Logs "<function>: <why the model refused the inputs><consequence>" and returns FMU_WARNING. */
-fmu_status component_warn(component* c, fmu_function function, const char* consequence);
-
 /* While waiting for the first sample: as if it were taken now, until model_end_trial(). FMU_WARNING, which is logged:
  * there is none of these inputs, and nothing to be ended. */
 fmu_status component_begin_trial(component* c, fmu_function function);
 
 /* While waiting: brings the outputs up to the present inputs; to 0 with FMU_WARNING. */
 fmu_status component_update_outputs(component* c, fmu_function function);
+
+/* Defines a function of FMI that hands its arguments on. */
+#define FMI_CALL(status, function, parameters, call) \
+  status function parameters {                       \
+    return (status)call;                             \
+  }
+
+/* --- life --------------------------------------------------------------------------------------------------------- */
+
+/* What the functions of both versions of FMI do; the caller adds types and arguments of its own version. */
+
+/* NULL, with the reason in the log. `identifier` is what the importer read in modelDescription.xml, `resources` the URI
+ * or path of the folder. */
+component* life_create(const log_target* log, const char* identifier, const char* resources);
+component* life_refuse(const log_target* log, const char* format, ...) LOG_FORMAT(2);
+
+fmu_status life_set_logging(component* c, int on, size_t count, const char* const categories[]);
+
+typedef struct experiment {
+  int tolerance_defined, stop_time_defined;
+  double tolerance, start_time, stop_time;
+} experiment;
+
+/* `function` is the one that brings the experiment: not the same in both versions. */
+fmu_status life_set_experiment(component* c, fmu_function function, const experiment* e);
+fmu_status life_enter_initialisation(component* c);
+fmu_status life_exit_initialisation(component* c);
+fmu_status life_terminate(component* c);
+fmu_status life_reset(component* c);
+fmu_status life_step(component* c, double time, double step);

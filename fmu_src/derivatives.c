@@ -3,14 +3,12 @@
 #include <math.h>
 #include <string.h>
 
-#include "finger_model.h"
-#include "finger_signals.h"
-#include "variable_access.h"
+#include "values.h"
 
 /* Directions of the inputs and derivatives of the outputs, laid out as the variables are, in room of the model. */
 static variables lay_out(const component* c) {
   variables view = c->values;
-  double* room = model_derivatives(c->model);
+  double* room = view.derivatives;
   memset(room, 0, (view.input_count + view.output_count) * sizeof *room);
   for (int g = 0; g < GROUP_COUNT; ++g) {
     const int laid_out = variable_groups[g].causality != CAUSALITY_PARAMETER && view.number[g];
@@ -50,6 +48,13 @@ static fmu_status check_references(component* c, fmu_function function, const un
 /* 1 when the call is allowed and the request is one; otherwise logs and fails. `in` are the variables of the seed. */
 static int is_sound(component* c, fmu_function function, const partials* p, const references* in,
                     const references* out) {
+  if (!component_may_call(c, function)) {
+    return 0;
+  }
+  if (model_text.no_derivatives) {
+    component_fail(c, call_name(function), "%s", model_text.no_derivatives);
+    return 0;
+  }
   if (!may_access(c, function, out->count, out->references, p->sensitivity) ||
       !may_access(c, function, in->count, in->references, p->seed) ||
       check_references(c, function, p->knowns.references, p->knowns.count, CAUSALITY_INPUT) ||
@@ -95,18 +100,12 @@ static fmu_status begin_derivatives(component* c, fmu_function function) {
   return c->waiting && !c->failed ? component_begin_trial(c, function) : FMU_OK;
 }
 
-/* Ends what begin_derivatives() began. 0 for the status OK; otherwise says why and fails. */
-static fmu_status end_derivatives(component* c, fmu_function function, tendonfmu_status status) {
+/* Ends what begin_derivatives() began, with what model_derive() returned. */
+static fmu_status end_derivatives(component* c, fmu_function function, int status) {
   if (c->waiting && !c->failed) {
     model_end_trial(c->model);
   }
-  return status == TENDONFMU_OK ? FMU_OK : component_fail_as_model(c, function);
-}
-
-static tendonfmu_status derive(component* c, const variables* view) {
-  const tendonfmu_inputs direction = variables_inputs(view);
-  const tendonfmu_outputs derivative = variables_outputs(view);
-  return tendonfmu_get_directional_derivative(model_finger(c->model), &direction, &derivative);
+  return status ? component_fail_as_model(c, function) : FMU_OK;
 }
 
 /* --- calls -------------------------------------------------------------------------------------------------------- */
@@ -124,7 +123,7 @@ fmu_status derivatives_directional(component* c, const partials* p) {
   }
   fmu_status status = begin_derivatives(c, function);
   if (status == FMU_OK) {
-    status = end_derivatives(c, function, derive(c, &view));
+    status = end_derivatives(c, function, model_derive(c->model, &view));
   }
   double* sensitivity = p->sensitivity;
   for (const double* number; status != FMU_ERROR && (number = next_number(&view, &p->unknowns, &unknown)) != NULL;) {
@@ -153,15 +152,15 @@ fmu_status derivatives_adjoint(component* c, const partials* p) {
   }
   const variables view = lay_out(c);
   const fmu_status begun = begin_derivatives(c, function);
-  tendonfmu_status status = TENDONFMU_OK;
+  int status = 0;
   double* sensitivity = p->sensitivity;
   if (begun != FMU_OK) {
     memset(sensitivity, 0, p->sensitivity_count * sizeof *sensitivity);
     return begun;
   }
-  for (double* number; status == TENDONFMU_OK && (number = next_number(&view, &p->knowns, &known)) != NULL;) {
+  for (double* number; !status && (number = next_number(&view, &p->knowns, &known)) != NULL;) {
     *number = 1.0;
-    status = derive(c, &view);
+    status = model_derive(c->model, &view);
     *number = 0.0;
     *sensitivity++ = weighted_sum(&view, p);
   }

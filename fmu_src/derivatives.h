@@ -1,4 +1,4 @@
-/* Partial derivatives of a finger's outputs by its inputs, of the sample last taken. */
+/* Partial derivatives of the model's outputs by its inputs, of the sample last taken. */
 #pragma once
 
 #include "component.h"

@@ -1,5 +1,4 @@
-#include "finger_model.h"
-
+/* The model of the friction FMU: a finger of tendonfmu.h. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,7 +11,6 @@ struct model {
   void* scratch;           /* [state_size] a state of the finger to go back to */
   size_t* changed_indices; /* [p] parameters to hand over */
   double* changed_values;  /* [p] */
-  double* derivatives;     /* [inputs + outputs] */
   int at_end;              /* a step takes the sample at its end, not at its beginning */
 };
 
@@ -21,24 +19,15 @@ const model_texts model_text = {.resource = "model.image",
                                 .waits = "the first step takes the first sample",
                                 .needs_inputs = 1};
 
-/* Copies as much as there is room for. */
-static void say(char* message, size_t size, const char* text) {
-  if (message && size) {
-    const size_t length = strlen(text) < size - 1 ? strlen(text) : size - 1;
-    memcpy(message, text, length);
-    message[length] = '\0';
-  }
-}
-
-model* model_create(const void* resource, size_t size, int at_end, char* message, size_t message_size) {
+model* model_create(const void* resource, size_t size, int at_end, log_text* reason) {
   model* m = calloc(1, sizeof *m);
   if (!m) {
-    say(message, message_size, "out of memory");
+    *reason = log_line("out of memory");
     return NULL;
   }
-  m->finger = tendonfmu_create(resource, size, message, message_size);
+  m->finger = tendonfmu_create(resource, size, reason->bytes, sizeof reason->bytes);
   if (!m->finger) {
-    free(m);
+    model_destroy(m);
     return NULL;
   }
   m->at_end = at_end;
@@ -51,9 +40,8 @@ model* model_create(const void* resource, size_t size, int at_end, char* message
   m->scratch = malloc(m->shape.state_size);
   m->changed_indices = malloc((m->shape.parameters + 1) * sizeof *m->changed_indices);
   m->changed_values = malloc((m->shape.parameters + 1) * sizeof *m->changed_values);
-  m->derivatives = calloc(GROUP_COUNT * (m->shape.joints + m->shape.tendons + 1), sizeof *m->derivatives);
-  if (!m->scratch || !m->changed_indices || !m->changed_values || !m->derivatives) {
-    say(message, message_size, "out of memory");
+  if (!m->scratch || !m->changed_indices || !m->changed_values) {
+    *reason = log_line("out of memory");
     model_destroy(m);
     return NULL;
   }
@@ -65,7 +53,6 @@ void model_destroy(model* m) {
   free(m->scratch);
   free(m->changed_indices);
   free(m->changed_values);
-  free(m->derivatives);
   free(m);
 }
 
@@ -85,16 +72,7 @@ const char* model_last_error(const model* m) {
   return tendonfmu_last_error(m->finger);
 }
 
-tendonfmu_finger* model_finger(const model* m) {
-  return m->finger;
-}
-
-double* model_derivatives(const model* m) {
-  return m->derivatives;
-}
-
-/* --- parameters ----------------------------------------------------------------------------------------------------
- */
+/* --- parameters --------------------------------------------------------------------------------------------------- */
 
 /* kinematics_source is the only setting */
 
@@ -134,8 +112,7 @@ const char* model_set_tolerance(model* m, double* tolerance) {
   return NULL;
 }
 
-/* --- samples -------------------------------------------------------------------------------------------------------
- */
+/* --- samples ------------------------------------------------------------------------------------------------------ */
 
 int model_is_initialised(const model* m) {
   return tendonfmu_is_initialised(m->finger);
@@ -223,8 +200,13 @@ model_answer model_step(model* m, variables* values, double time, double step) {
   return take_sample(m, values, sample_time(m, time, step));
 }
 
-/* --- saved states --------------------------------------------------------------------------------------------------
- */
+int model_derive(const model* m, const variables* view) {
+  const tendonfmu_inputs direction = variables_inputs(view);
+  const tendonfmu_outputs derivative = variables_outputs(view);
+  return tendonfmu_get_directional_derivative(m->finger, &direction, &derivative) == TENDONFMU_OK ? 0 : -1;
+}
+
+/* --- saved states ------------------------------------------------------------------------------------------------- */
 
 void model_fetch_outputs(const model* m, variables* values) {
   variables_fetch_outputs(values, m->finger);

@@ -1,6 +1,8 @@
-/* FMI 2.0, creation, life cycle, steps and their status. */
+/* FMI 2.0: each function hands its arguments to one that serves both versions. */
+#include "derivatives.h"
 #include "fmi2Functions.h"
-#include "life_cycle.h"
+#include "states.h"
+#include "values.h"
 
 /* --- inquiry and logging ------------------------------------------------------------------------------------------ */
 
@@ -12,10 +14,9 @@ const char* fmi2GetVersion(void) {
   return fmi2Version;
 }
 
-fmi2Status fmi2SetDebugLogging(fmi2Component instance, fmi2Boolean loggingOn, size_t nCategories,
-                               const fmi2String categories[]) {
-  return (fmi2Status)life_set_logging(instance, loggingOn != fmi2False, nCategories, categories);
-}
+FMI_CALL(fmi2Status, fmi2SetDebugLogging,
+         (fmi2Component instance, fmi2Boolean loggingOn, size_t nCategories, const fmi2String categories[]),
+         life_set_logging(instance, loggingOn != fmi2False, nCategories, categories))
 
 /* the text as a format string that prints it */
 static void escape_percent(char* to, const char* from) {
@@ -71,15 +72,10 @@ fmi2Status fmi2SetupExperiment(fmi2Component instance, fmi2Boolean toleranceDefi
   return (fmi2Status)life_set_experiment(instance, CALL_SETUP_EXPERIMENT, &e);
 }
 
-#define WITHOUT_ARGUMENTS(function, life)       \
-  fmi2Status function(fmi2Component instance) { \
-    return (fmi2Status)life(instance);          \
-  }
-
-WITHOUT_ARGUMENTS(fmi2EnterInitializationMode, life_enter_initialisation)
-WITHOUT_ARGUMENTS(fmi2ExitInitializationMode, life_exit_initialisation)
-WITHOUT_ARGUMENTS(fmi2Terminate, life_terminate)
-WITHOUT_ARGUMENTS(fmi2Reset, life_reset)
+FMI_CALL(fmi2Status, fmi2EnterInitializationMode, (fmi2Component instance), life_enter_initialisation(instance))
+FMI_CALL(fmi2Status, fmi2ExitInitializationMode, (fmi2Component instance), life_exit_initialisation(instance))
+FMI_CALL(fmi2Status, fmi2Terminate, (fmi2Component instance), life_terminate(instance))
+FMI_CALL(fmi2Status, fmi2Reset, (fmi2Component instance), life_reset(instance))
 
 fmi2Status fmi2DoStep(fmi2Component instance, fmi2Real currentCommunicationPoint, fmi2Real communicationStepSize,
                       fmi2Boolean noSetFMUStatePriorToCurrentPoint) {
@@ -142,3 +138,54 @@ fmi2Status fmi2GetStringStatus(fmi2Component instance, const fmi2StatusKind kind
   (void)kind;
   return begin_status(instance, CALL_GET_STRING_STATUS, value, 0);
 }
+
+/* --- variables: fmi2Integer and fmi2Boolean are int, and a value reference is one number -------------------------- */
+
+#define ACCESS(type, CODE, FORMAT)                                                                                   \
+  fmi2Status fmi2Get##type(fmi2Component instance, const fmi2ValueReference vr[], size_t nvr, fmi2##type value[]) {  \
+    return (fmi2Status)values_get(instance, CALL_GET_##CODE, VARIABLE_##CODE, vr, nvr, VALUES_##FORMAT, value, nvr); \
+  }                                                                                                                  \
+  fmi2Status fmi2Set##type(fmi2Component instance, const fmi2ValueReference vr[], size_t nvr,                        \
+                           const fmi2##type value[]) {                                                               \
+    return (fmi2Status)values_set(instance, CALL_SET_##CODE, VARIABLE_##CODE, vr, nvr, VALUES_##FORMAT, value, nvr); \
+  }
+
+ACCESS(Real, REAL, DOUBLE)
+ACCESS(Integer, INTEGER, INT)
+ACCESS(Boolean, BOOLEAN, INT)
+
+FMI_CALL(fmi2Status, fmi2GetString,
+         (fmi2Component instance, const fmi2ValueReference vr[], size_t nvr, fmi2String value[]),
+         values_refuse(instance, CALL_GET_STRING, "String", vr, nvr, value))
+FMI_CALL(fmi2Status, fmi2SetString,
+         (fmi2Component instance, const fmi2ValueReference vr[], size_t nvr, const fmi2String value[]),
+         values_refuse(instance, CALL_SET_STRING, "String", vr, nvr, value))
+
+/* --- derivatives -------------------------------------------------------------------------------------------------- */
+
+fmi2Status fmi2GetDirectionalDerivative(fmi2Component instance, const fmi2ValueReference vUnknown_ref[],
+                                        size_t nUnknown, const fmi2ValueReference vKnown_ref[], size_t nKnown,
+                                        const fmi2Real dvKnown[], fmi2Real dvUnknown[]) {
+  const partials p = {.unknowns = {vUnknown_ref, nUnknown},
+                      .knowns = {vKnown_ref, nKnown},
+                      .seed = dvKnown,
+                      .sensitivity = dvUnknown,
+                      .seed_count = nKnown,
+                      .sensitivity_count = nUnknown};
+  return (fmi2Status)derivatives_directional(instance, &p);
+}
+
+/* --- states ------------------------------------------------------------------------------------------------------- */
+
+FMI_CALL(fmi2Status, fmi2GetFMUstate, (fmi2Component instance, fmi2FMUstate* FMUstate), states_get(instance, FMUstate))
+FMI_CALL(fmi2Status, fmi2SetFMUstate, (fmi2Component instance, fmi2FMUstate FMUstate), states_set(instance, FMUstate))
+FMI_CALL(fmi2Status, fmi2FreeFMUstate, (fmi2Component instance, fmi2FMUstate* FMUstate),
+         states_free(instance, FMUstate))
+FMI_CALL(fmi2Status, fmi2SerializedFMUstateSize, (fmi2Component instance, fmi2FMUstate FMUstate, size_t* size),
+         states_serialized_size(instance, FMUstate, size))
+FMI_CALL(fmi2Status, fmi2SerializeFMUstate,
+         (fmi2Component instance, fmi2FMUstate FMUstate, fmi2Byte serializedState[], size_t size),
+         states_serialize(instance, FMUstate, serializedState, size))
+FMI_CALL(fmi2Status, fmi2DeSerializeFMUstate,
+         (fmi2Component instance, const fmi2Byte serializedState[], size_t size, fmi2FMUstate* FMUstate),
+         states_deserialize(instance, serializedState, size, FMUstate))

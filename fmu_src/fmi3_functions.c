@@ -1,6 +1,9 @@
-/* FMI 3.0, creation, life cycle and steps. */
+/* FMI 3.0: each function hands its arguments to one that serves both versions. */
+#include "derivatives.h"
 #include "fmi3Functions.h"
-#include "life_cycle.h"
+#include "refused_call.h"
+#include "states.h"
+#include "values.h"
 
 /* --- inquiry and logging ------------------------------------------------------------------------------------------ */
 
@@ -8,10 +11,9 @@ const char* fmi3GetVersion(void) {
   return fmi3Version;
 }
 
-fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean loggingOn, size_t nCategories,
-                               const fmi3String categories[]) {
-  return (fmi3Status)life_set_logging(instance, loggingOn, nCategories, categories);
-}
+FMI_CALL(fmi3Status, fmi3SetDebugLogging,
+         (fmi3Instance instance, fmi3Boolean loggingOn, size_t nCategories, const fmi3String categories[]),
+         life_set_logging(instance, loggingOn, nCategories, categories))
 
 static void send_message(const log_target* target, fmu_status status, const char* category, const char* text) {
   const fmi3LogMessageCallback log_message = (fmi3LogMessageCallback)target->logger;
@@ -89,17 +91,9 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolera
   return (fmi3Status)(status == FMU_OK ? life_enter_initialisation(instance) : status);
 }
 
-fmi3Status fmi3ExitInitializationMode(fmi3Instance instance) {
-  return (fmi3Status)life_exit_initialisation(instance);
-}
-
-fmi3Status fmi3Terminate(fmi3Instance instance) {
-  return (fmi3Status)life_terminate(instance);
-}
-
-fmi3Status fmi3Reset(fmi3Instance instance) {
-  return (fmi3Status)life_reset(instance);
-}
+FMI_CALL(fmi3Status, fmi3ExitInitializationMode, (fmi3Instance instance), life_exit_initialisation(instance))
+FMI_CALL(fmi3Status, fmi3Terminate, (fmi3Instance instance), life_terminate(instance))
+FMI_CALL(fmi3Status, fmi3Reset, (fmi3Instance instance), life_reset(instance))
 
 static void put_flag(fmi3Boolean* flag) {
   if (flag) {
@@ -121,3 +115,81 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
   }
   return (fmi3Status)status;
 }
+
+/* --- variables: arrays are read and written whole ----------------------------------------------------------------- */
+
+#define ACCESS(type, CODE, FORMAT)                                                                                \
+  fmi3Status fmi3Get##type(fmi3Instance instance, const fmi3ValueReference references[], size_t count,            \
+                           fmi3##type values[], size_t value_count) {                                             \
+    return (fmi3Status)values_get(instance, CALL_GET_##CODE, VARIABLE_##CODE, references, count, VALUES_##FORMAT, \
+                                  values, value_count);                                                           \
+  }                                                                                                               \
+  fmi3Status fmi3Set##type(fmi3Instance instance, const fmi3ValueReference references[], size_t count,            \
+                           const fmi3##type values[], size_t value_count) {                                       \
+    return (fmi3Status)values_set(instance, CALL_SET_##CODE, VARIABLE_##CODE, references, count, VALUES_##FORMAT, \
+                                  values, value_count);                                                           \
+  }
+
+ACCESS(Float64, REAL, DOUBLE)
+ACCESS(Int32, INTEGER, INT)
+ACCESS(Boolean, BOOLEAN, BOOL)
+
+/* --- types that no variable has ----------------------------------------------------------------------------------- */
+
+#define REFUSE_TYPE(CODE, type)                                                                        \
+  fmi3Status fmi3Get##type(fmi3Instance instance, const fmi3ValueReference references[], size_t count, \
+                           fmi3##type values[], size_t value_count) {                                  \
+    return (fmi3Status)values_refuse(instance, CALL_GET_##CODE, #type, references, count, values);     \
+  }                                                                                                    \
+  fmi3Status fmi3Set##type(fmi3Instance instance, const fmi3ValueReference references[], size_t count, \
+                           const fmi3##type values[], size_t value_count) {                            \
+    return (fmi3Status)values_refuse(instance, CALL_SET_##CODE, #type, references, count, values);     \
+  }
+
+OTHER_TYPES(REFUSE_TYPE)
+REFUSE_TYPE(STRING, String)
+
+FMI_CALL(fmi3Status, fmi3GetBinary,
+         (fmi3Instance instance, const fmi3ValueReference references[], size_t count, size_t sizes[],
+          fmi3Binary values[], size_t value_count),
+         values_refuse(instance, CALL_GET_BINARY, "Binary", references, count, values))
+FMI_CALL(fmi3Status, fmi3SetBinary,
+         (fmi3Instance instance, const fmi3ValueReference references[], size_t count, const size_t sizes[],
+          const fmi3Binary values[], size_t value_count),
+         values_refuse(instance, CALL_SET_BINARY, "Binary", references, count, values))
+FMI_CALL(fmi3Status, fmi3GetClock,
+         (fmi3Instance instance, const fmi3ValueReference references[], size_t count, fmi3Clock values[]),
+         values_refuse(instance, CALL_GET_CLOCK, "Clock", references, count, values))
+FMI_CALL(fmi3Status, fmi3SetClock,
+         (fmi3Instance instance, const fmi3ValueReference references[], size_t count, const fmi3Clock values[]),
+         values_refuse(instance, CALL_SET_CLOCK, "Clock", references, count, values))
+
+/* --- derivatives -------------------------------------------------------------------------------------------------- */
+
+fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns,
+                                        const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[],
+                                        size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity) {
+  const partials p = {{unknowns, nUnknowns}, {knowns, nKnowns}, seed, sensitivity, nSeed, nSensitivity};
+  return (fmi3Status)derivatives_directional(instance, &p);
+}
+
+fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns,
+                                    const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[],
+                                    size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity) {
+  const partials p = {{unknowns, nUnknowns}, {knowns, nKnowns}, seed, sensitivity, nSeed, nSensitivity};
+  return (fmi3Status)derivatives_adjoint(instance, &p);
+}
+
+/* --- states ------------------------------------------------------------------------------------------------------- */
+
+FMI_CALL(fmi3Status, fmi3GetFMUState, (fmi3Instance instance, fmi3FMUState* FMUState), states_get(instance, FMUState))
+FMI_CALL(fmi3Status, fmi3SetFMUState, (fmi3Instance instance, fmi3FMUState FMUState), states_set(instance, FMUState))
+FMI_CALL(fmi3Status, fmi3FreeFMUState, (fmi3Instance instance, fmi3FMUState* FMUState), states_free(instance, FMUState))
+FMI_CALL(fmi3Status, fmi3SerializedFMUStateSize, (fmi3Instance instance, fmi3FMUState FMUState, size_t* size),
+         states_serialized_size(instance, FMUState, size))
+FMI_CALL(fmi3Status, fmi3SerializeFMUState,
+         (fmi3Instance instance, fmi3FMUState FMUState, fmi3Byte serializedState[], size_t size),
+         states_serialize(instance, FMUState, serializedState, size))
+FMI_CALL(fmi3Status, fmi3DeserializeFMUState,
+         (fmi3Instance instance, const fmi3Byte serializedState[], size_t size, fmi3FMUState* FMUState),
+         states_deserialize(instance, serializedState, size, FMUState))

@@ -4,8 +4,10 @@
 #include <stdarg.h>
 #include <stddef.h>
 
-#include "status.h"
 #include "variable_table.h"
+
+/* What an FMI function returns; the numbers are those of fmi2Status and fmi3Status. */
+typedef enum fmu_status { FMU_OK, FMU_WARNING, FMU_DISCARD, FMU_ERROR } fmu_status;
 
 #if defined(__GNUC__)
 #define LOG_FORMAT(at) __attribute__((format(printf, at, at + 1)))

@@ -4,23 +4,26 @@
 
 #include <stddef.h>
 
+#include "log.h"
 #include "variable_table.h"
 
 typedef struct model model;
 struct variables;
 
 typedef struct model_texts {
-  const char* resource;    /* file in the folder resources that model_create() takes */
-  const char* initialised; /* what fmi2ExitInitializationMode logs */
-  const char* waits;       /* the same where the first step has to initialise */
-  int needs_inputs;        /* inputs that nobody has set are no reason to initialise */
+  const char* resource;       /* file in the folder resources that model_create() takes */
+  const char* initialised;    /* what fmi2ExitInitializationMode logs */
+  const char* waits;          /* the same where the first step has to initialise */
+  int needs_inputs;           /* inputs that nobody has set are no reason to initialise */
+  const char* no_derivatives; /* why there are none; NULL: there are */
 } model_texts;
 extern const model_texts model_text;
 
-/* Of the bytes of the resource. `at_end`: the inputs of a step are those of its end. NULL when refused, with the reason
- * in message. */
-model* model_create(const void* resource, size_t size, int at_end, char* message, size_t message_size);
-void model_destroy(model* m);
+/* Of the bytes of the resource. `at_end`: the inputs of a step are those of its end. NULL when refused, with the
+ * reason.
+ */
+model* model_create(const void* resource, size_t size, int at_end, log_text* reason);
+void model_destroy(model* m); /* not NULL */
 
 /* Back to what model_create() gave. */
 void model_reset(model* m);
@@ -40,8 +43,7 @@ model_shape model_get_shape(const model* m);
 /* One line about the last call that failed. */
 const char* model_last_error(const model* m);
 
-/* --- parameters ----------------------------------------------------------------------------------------------------
- */
+/* --- parameters --------------------------------------------------------------------------------------------------- */
 
 typedef struct model_range {
   const char* unit;
@@ -66,8 +68,7 @@ int model_parameter_path(const model* m, size_t index, char* path, size_t size);
 /* The tolerance of fmi2SetupExperiment, replaced by the nearest that the model can use. NULL, or what was expected. */
 const char* model_set_tolerance(model* m, double* tolerance);
 
-/* --- life ----------------------------------------------------------------------------------------------------------
- */
+/* --- life --------------------------------------------------------------------------------------------------------- */
 
 /* All but MODEL_OK leave everything as it was, with the reason in model_last_error(). */
 typedef enum model_answer {
@@ -95,8 +96,11 @@ double model_get_time(const model* m);
 /* Copies the outputs into the variables. */
 void model_fetch_outputs(const model* m, struct variables* values);
 
-/* --- saved states --------------------------------------------------------------------------------------------------
- */
+/* Derivatives of the outputs, of the sample last taken, in the direction of the inputs: both in `view`, a layout of
+ * variables. 0 or -1. */
+int model_derive(const model* m, const struct variables* view);
+
+/* --- saved states ------------------------------------------------------------------------------------------------- */
 
 void model_save(const model* m, void* bytes);
 

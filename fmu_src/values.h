@@ -17,3 +17,32 @@ fmu_status values_set(component* c, fmu_function function, variable_type type, c
 /* The same for a type that no variable has: says what the first one is. */
 fmu_status values_refuse(component* c, fmu_function function, const char* type, const unsigned references[],
                          size_t count, const void* values);
+
+/* --- what derivatives need, too ----------------------------------------------------------------------------------- */
+
+/* 1 when the call is allowed and has its pointers; otherwise logs and fails. */
+int may_access(component* c, fmu_function function, size_t count, const void* references, const void* values);
+
+/* Fails with what the variable is instead of the type, or that there is none. */
+fmu_status fail_of_type(component* c, fmu_function function, unsigned reference, const char* type, variable* found);
+
+/* A variable of the type; otherwise says what it is, or that there is none, and fails. */
+static inline fmu_status find_of_type(component* c, fmu_function function, variable_type type, unsigned reference,
+                                      variable* found) {
+  return variables_find(&c->values, reference, found) == 0 && variable_type_of(found) == type
+             ? FMU_OK
+             : fail_of_type(c, function, reference, this_fmi.types[type], found);
+}
+
+/* 1 for the independent variable, which is no other variable's and has one element. */
+static inline int is_time(unsigned reference, variable_type type) {
+  return reference == VARIABLE_TIME_REFERENCE && type == VARIABLE_REAL && this_fmi.time_is_variable;
+}
+
+/* Whether the variables of a type have value_count elements together; otherwise says how many `argument` should have,
+ * or what is wrong with a variable, and fails. */
+fmu_status check_value_count(component* c, fmu_function function, variable_type type, const unsigned references[],
+                             size_t count, size_t value_count, const char* argument);
+
+/* Fails with "<function>: <variable>: <reason>". */
+fmu_status fail_at(component* c, fmu_function function, const variable* found, const char* reason);

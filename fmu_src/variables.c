@@ -56,7 +56,7 @@ int variables_create(variables* v, const model* m, int arrays) {
   v->input_count = share_out(v, CAUSALITY_INPUT, NULL);
   v->output_count = share_out(v, CAUSALITY_OUTPUT, NULL);
   const size_t settings = share_out(v, CAUSALITY_PARAMETER, NULL);
-  v->numbers = calloc(v->input_count + v->output_count + settings + v->parameter_count, sizeof(double));
+  v->numbers = calloc(2 * (v->input_count + v->output_count) + settings + v->parameter_count, sizeof(double));
   v->flags = calloc(share_out_flags(v, NULL), 1);
   if (!v->numbers || !v->flags) {
     return -1;
@@ -65,6 +65,7 @@ int variables_create(variables* v, const model* m, int arrays) {
   double* outputs = v->numbers + share_out(v, CAUSALITY_INPUT, v->numbers);
   double* of_settings = outputs + share_out(v, CAUSALITY_OUTPUT, outputs);
   v->parameters = of_settings + share_out(v, CAUSALITY_PARAMETER, of_settings);
+  v->derivatives = v->parameters + v->parameter_count;
   variables_start(v, m);
   return 0;
 }

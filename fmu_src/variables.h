@@ -12,6 +12,7 @@ typedef struct variables {
   size_t parameter_count;           /* p */
   int arrays;                       /* a value reference stands for a whole group, not for one element */
   double* numbers;                  /* one block: what the pointers below point into */
+  double* derivatives;              /* [input_count + output_count] room for a second layout of these */
   unsigned char* flags;             /* likewise */
   size_t count[GROUP_COUNT];        /* elements of each group; 0 where the model does not have what it needs */
   size_t input_count, output_count; /* inputs stand first in the block, then Real and Integer outputs, then settings */

@@ -276,7 +276,7 @@ class call_sequence {
       if (at + 40 < bytes.size()) {
         store_u64(&bytes[at + 24], hash_bytes(&bytes[at + 32], bytes.size() - at - 32, 0));
       }
-      store_u64(&bytes[24], hash_bytes(&bytes[32], bytes.size() - 32, 0));  // as component_state.c has it
+      store_u64(&bytes[24], hash_bytes(&bytes[32], bytes.size() - 32, 0));  // as states.c has it
     }
     if (rarely()) {
       bytes.resize(data_.ConsumeIntegralInRange<std::size_t>(0, bytes.size() + 8));

@@ -13,7 +13,6 @@ extern "C" {
 #include "call_table.h"
 #include "component.h"
 #include "model.h"
-#include "status.h"
 #include "variable_table.h"
 }
 

@@ -11,32 +11,34 @@
 
 static const double longest_step = 1000.0; /* s; half a minute of computing */
 
-const model_texts model_text = {
-    .resource = "rig.json", .initialised = "the finger has settled", .waits = "the finger settles with the first step"};
+const model_texts model_text = {.resource = "rig.json",
+                                .initialised = "the finger has settled",
+                                .waits = "the finger settles with the first step",
+                                .no_derivatives = "there are none: providesDirectionalDerivative is false"};
 
-/* --- creation ------------------------------------------------------------------------------------------------------
- */
+/* --- creation ----------------------------------------------------------------------------------------------------- */
 
-static model* refuse(model* m, char* message, size_t size, const char* reason) {
-  if (message && size) {
-    snprintf(message, size, "%s", reason);
+static model* refuse(model* m, log_text* reason, const char* why) {
+  if (why) {
+    *reason = log_line("%s", why);
   }
-  model_destroy(m);
+  if (m) {
+    model_destroy(m);
+  }
   return NULL;
 }
 
 /* Its inputs are held over a step, and its outputs are those of the end: there is no choice. */
-model* model_create(const void* resource, size_t size, int at_end, char* message, size_t message_size) {
+model* model_create(const void* resource, size_t size, int at_end, log_text* reason) {
   (void)at_end;
   tendonfmu_plant_settings settings;
   model* m = calloc(1, sizeof *m);
   if (!m) {
-    return refuse(m, message, message_size, "out of memory");
+    return refuse(m, reason, "out of memory");
   }
-  m->plant = tendonfmu_plant_create(resource, size, message, message_size);
+  m->plant = tendonfmu_plant_create(resource, size, reason->bytes, sizeof reason->bytes);
   if (!m->plant) {
-    model_destroy(m);
-    return NULL;
+    return refuse(m, reason, NULL);
   }
   m->joints = tendonfmu_plant_joint_count(m->plant);
   m->tendons = tendonfmu_plant_tendon_count(m->plant);
@@ -46,27 +48,25 @@ model* model_create(const void* resource, size_t size, int at_end, char* message
   m->before = calloc(m->input_count, sizeof *m->before);
   m->scratch = malloc(m->plant_state_size);
   if (!m->inputs || !m->before || !m->scratch) {
-    return refuse(m, message, message_size, "out of memory");
+    return refuse(m, reason, "out of memory");
   }
   if (tendonfmu_plant_get_settings(m->plant, &settings) != TENDONFMU_PLANT_OK) {
-    return refuse(m, message, message_size, tendonfmu_plant_last_error(m->plant));
+    return refuse(m, reason, tendonfmu_plant_last_error(m->plant));
   }
   settings_to_numbers(&settings, m->given);
   if (m->given[SETTING_SEED] > variable_groups[GROUP_SEED].maximum) {
-    return refuse(m, message, message_size, "seed: expected at most 2147483647 in an FMU, whose Integer has 32 bits");
+    return refuse(m, reason, "seed: expected at most 2147483647 in an FMU, whose Integer has 32 bits");
   }
   memcpy(m->wanted, m->given, sizeof m->wanted);
   return m;
 }
 
 void model_destroy(model* m) {
-  if (m) {
-    tendonfmu_plant_destroy(m->plant);
-    free(m->inputs);
-    free(m->before);
-    free(m->scratch);
-    free(m);
-  }
+  tendonfmu_plant_destroy(m->plant);
+  free(m->inputs);
+  free(m->before);
+  free(m->scratch);
+  free(m);
 }
 
 void model_reset(model* m) {
@@ -95,8 +95,7 @@ int plant_failed(model* m) {
   return -1;
 }
 
-/* --- parameters ----------------------------------------------------------------------------------------------------
- */
+/* --- parameters --------------------------------------------------------------------------------------------------- */
 
 double model_get_setting(const model* m, variable_group_id group, size_t index) {
   return m->wanted[setting_place(group, index)];
@@ -139,8 +138,7 @@ int model_parameter_path(const model* m, size_t index, char* path, size_t size) 
   return -1;
 }
 
-/* --- inputs and outputs --------------------------------------------------------------------------------------------
- */
+/* --- inputs and outputs ------------------------------------------------------------------------------------------- */
 
 /* All inputs [input_count] of the importer: they stand one after the other in the block of variables. */
 static const double* inputs_of(const variables* values) {
@@ -218,8 +216,12 @@ void model_fetch_outputs(const model* m, variables* values) {
   tendonfmu_plant_get_signals(m->plant, &signals);
 }
 
-/* --- initialisation ------------------------------------------------------------------------------------------------
- */
+int model_derive(const model* m, const variables* view) {
+  (void)m, (void)view;
+  return -1; /* never called: see no_derivatives */
+}
+
+/* --- initialisation ----------------------------------------------------------------------------------------------- */
 
 int plant_start_over(model* m, const double* settings) {
   const tendonfmu_plant_settings taken = settings_from_numbers(settings);
@@ -278,8 +280,7 @@ void model_end_trial(model* m) {
   (void)m;
 }
 
-/* --- steps ---------------------------------------------------------------------------------------------------------
- */
+/* --- steps -------------------------------------------------------------------------------------------------------- */
 
 /* s, what an importer's additions and the start time leave in the last digits */
 static double lost_digits(double start, double time) {

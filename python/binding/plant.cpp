@@ -148,17 +148,15 @@ class bound_plant : bound_handle<tendonfmu_plant, tendonfmu_plant_destroy, tendo
     check(tendonfmu_plant_get_continuous_state(get(), values));
     return array;
   }
-  // [1, order] and, when wanted, [order, order]
-  nb::tuple derivative(double time, const number_row& state, bool with_jacobian) const {
+  // [1, order]
+  nb::object derivative(double time, const number_row& state) const {
     const std::size_t size = order();
     if (state.shape(0) != size) {
       throw nb::value_error(("derivative: expected a state of " + std::to_string(size) + " numbers").c_str());
     }
-    auto [slope, slope_values] = new_array<double>({1, size});
-    auto [jacobian, jacobian_values] = new_array<double>({with_jacobian ? size : 0, size});
-    check(
-        tendonfmu_plant_derivative(get(), time, state.data(), slope_values, with_jacobian ? jacobian_values : nullptr));
-    return nb::make_tuple(slope, jacobian);
+    auto [slope, values] = new_array<double>({1, size});
+    check(tendonfmu_plant_derivative(get(), time, state.data(), values));
+    return slope;
   }
 
  private:

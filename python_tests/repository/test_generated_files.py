@@ -66,7 +66,7 @@ def test_an_output_is_a_fact_of_one_table(generator: ModuleType) -> None:
     found = changed(generator, lambda facts: facts.outputs["groups"].append(row))
     assert found == {
         "docs/reference/fmu_variables.md",
-        "fmu_src/finger_signals.c",
+        "fmu_src/finger_signals.h",
         "modelDescription/variables.json",
         "python/binding/output_table.h",
         "python/tendonfmu/model/output_names.py",

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <exception>
 
 extern "C" {
 #include "bytes.h"
@@ -24,3 +25,31 @@ extern "C" {
 #include "sensor_fault.h"
 #include "slot_view.h"
 }
+
+namespace tendonfmu {
+
+/* Calls visit(item) for all items of a model. No exception may pass through the core's C, so one is carried around it.
+ */
+template <typename Visit>
+void visit_items(const model_shape& shape, const Visit& visit) {
+  struct carrier {
+    const Visit& visit;
+    std::exception_ptr failure;
+  } all{visit, nullptr};
+  const auto call = [](void* context, const model_item* item) noexcept {
+    carrier& all = *static_cast<carrier*>(context);
+    try {
+      all.visit(*item);
+      return 0;
+    } catch (...) {
+      all.failure = std::current_exception();
+      return -1;
+    }
+  };
+  model_visit(&shape, call, &all);
+  if (all.failure) {
+    std::rethrow_exception(all.failure);
+  }
+}
+
+}  // namespace tendonfmu

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstddef>
+#include <locale>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 
@@ -10,6 +12,15 @@ namespace tendonfmu {
 struct description_error : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
+
+/* A line put together from texts and numbers: six digits, which no locale changes. */
+template <class... Parts>
+std::string sentence(const Parts&... parts) {
+  std::ostringstream line;
+  line.imbue(std::locale::classic());
+  (line << ... << parts);
+  return line.str();
+}
 
 /* Text of the description as it may stand in a message: on one line, printable, at most `limit` bytes of valid UTF-8.
  */

@@ -1,15 +1,27 @@
-/* A value of the description together with its path, so that whoever finds fault can say where. A node may be absent:
- * a key left out, null, or anything within either. */
+/* JSON texts, and their values together with where they stand. */
 #pragma once
 
 #include <cstddef>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
-#include "json_document.h"
-
 namespace tendonfmu {
 
+using json = nlohmann::json;
+
+/* Larger than any finger: 16 joints × 64 tendons × 256 working points with two-sided laws are about 50 MB. */
+constexpr std::size_t max_document_bytes = std::size_t{64} << 20;
+
+/* A description has seven levels. */
+constexpr std::size_t max_document_depth = 32;
+
+/* Parses a JSON text (RFC 8259, UTF-8, no comments). Throws description_error with line and column of a syntax error,
+ * a number beyond the range of a double or a byte that is not UTF-8, or with the path of a key given twice. */
+json parse_document(const char* text, std::size_t size);
+
+/* A value of the description together with its path, so that whoever finds fault can say where. A node may be absent: a
+ * key left out, null, or anything within either. */
 class json_node {
  public:
   /* The whole document, which must outlive all nodes. */

@@ -143,8 +143,7 @@ class pass_worker {
   std::vector<joint_sum> joints_;
 };
 
-/* --- joining the segments of one recording, in order ---------------------------------------------------------------
- */
+/* --- joining the segments of one recording, in order -------------------------------------------------------------- */
 
 /* what the bias holds of each column at the start of a recording: nothing, or bias.initial_torque and its derivative */
 std::vector<VectorXd> held_at_start(const fit_problem& problem, const std::vector<double>& z) {
@@ -177,8 +176,7 @@ void join(const segment_sum& segment, std::vector<VectorXd>* held, MatrixXd* sum
   }
 }
 
-/* --- threads --------------------------------------------------------------------------------------------------------
- */
+/* --- threads ------------------------------------------------------------------------------------------------------ */
 
 struct pass_task {
   std::size_t recording, segment;

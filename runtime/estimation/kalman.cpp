@@ -71,13 +71,17 @@ void kalman_filter::set_row(Index row, const Slopes& slopes) {
   rows_.row(row).tail(joints()).setZero();
 }
 
-/* H P and H P Hᵀ */
+/* H P and H P Hᵀ, of which the lower triangle is enough */
 void kalman_filter::multiply_rows(Index rows) {
   const auto size = static_cast<std::size_t>(order()), count = static_cast<std::size_t>(rows),
              stride = static_cast<std::size_t>(inner_.cols());
   const products& by = best_products();
   by.multiply_symmetric(product_.data(), size, covariance_.data(), size, rows_.data(), count, size);
-  by.multiply_transposed(inner_.data(), stride, rows_.data(), count, size, product_.data(), count, size, size);
+  for (std::size_t first = 0, end; first < count; first = end) {
+    end = std::min(first + 12, count);
+    by.multiply_transposed(inner_.data() + first * stride, stride, rows_.data() + first * size, end - first, size,
+                           product_.data(), end, size, size);
+  }
 }
 
 void kalman_filter::start_bias(const double* bias, const double* rows, double variance) {
@@ -162,7 +166,7 @@ void kalman_filter::propagate(Index rows) {
     covariance_.bottomLeftCorner(n, p) += moved.leftCols(p);
     covariance_.bottomRightCorner(n, n) +=
         moved.rightCols(n) + moved.rightCols(n).transpose() + inner_.block(m, m, n, n);
-    product_.topRightCorner(m, n) += inner_.block(0, m, m, n);
+    product_.topRightCorner(m, n) += inner_.block(m, 0, n, m).transpose();
   }
   for (Index row = 0; row < m; ++row) {
     product_(row, p + row % n) += settings_.drift_variance * time_[row / n];

@@ -19,7 +19,7 @@ using const_columns_view = Eigen::Map<const by_columns>;
 using const_rows_view = Eigen::Map<const by_rows, 0, Eigen::OuterStride<>>;
 
 /* Of what is multiplied at once: what Eigen copies then fits on the stack, and Eigen does not divide the sums. */
-constexpr Index wide = 84, deep = 80, tall = 48;
+constexpr Index wide = 84, deep = 80, tall = 48, strip = 8;
 
 Index least(Index a, Index b) {
   return a < b ? a : b;
@@ -76,7 +76,7 @@ void multiply_symmetric(double* product, std::size_t product_stride, const doubl
   const auto order = static_cast<Index>(p), count = static_cast<Index>(k);
   const const_columns_view s(lower, order, order);
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, tall, deep> left;
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, deep, wide> right;
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, deep, wide> right;
   auto target = rows_at<rows_view>(product, k, p, product_stride);
   target.setZero();
   for (Index first = 0; first < count; first += tall) {
@@ -91,9 +91,16 @@ void multiply_symmetric(double* product, std::size_t product_stride, const doubl
       for (Index i = 0; i < order; i += wide) {
         const Index width = least(wide, order - i);
         right.resize(depth, width);
+        /* what the triangle has above the diagonal stands in rows: a few columns at a time, each read downwards */
+        for (Index c = 0; c < width; c += strip) {
+          for (Index u = 0; u < depth; ++u) {
+            for (Index k = c; k < least(least(c + strip, width), used[u] - i); ++k) {
+              right(u, k) = s(used[u], i + k);
+            }
+          }
+        }
         for (Index u = 0; u < depth; ++u) {
           const Index above = used[u] > i ? least(used[u] - i, width) : 0;
-          right.row(u).head(above) = s.row(used[u]).segment(i, above);
           right.row(u).tail(width - above) = s.col(used[u]).segment(i + above, width - above).transpose();
         }
         target.block(first, i, some.rows(), width).noalias() += left * right;

@@ -6,8 +6,7 @@
 
 namespace tendonfmu::estimation {
 
-/* --- a finger without contact ---------------------------------------------------------------------------------------
- */
+/* --- a finger without contact ------------------------------------------------------------------------------------- */
 
 free_finger::free_finger(const void* image, std::size_t image_size) {
   char message[ERROR_BYTES] = "";
@@ -21,28 +20,19 @@ free_finger::free_finger(const void* image, std::size_t image_size) {
 
 /* With thresholds that nothing reaches. bias.initial_torque is fixed, and no longer matters, after the first sample. */
 void free_finger::set(const std::vector<double>& numbers) {
-  struct difference {
-    free_finger* self;
-    const std::vector<double>& numbers;
-  } context{this, numbers};
   changed_.clear();
   values_.clear();
-  model_visit(
-      &finger_->shape,
-      [](void* context, const model_item* item) {
-        const auto& [self, numbers] = *static_cast<const difference*>(context);
-        const bool unreached = item->kind == ITEM_CONTACT_THRESHOLD || item->kind == ITEM_BAND_NOISE;
-        const bool fixed = item->kind == ITEM_INITIAL_TORQUE && tendonfmu_is_initialised(self->get());
-        for (std::uint32_t p = item->first; p < item->first + item->count && !fixed; ++p) {
-          const double value = unreached ? parameter_range_of(item, p).maximum : numbers[p];
-          if (value != self->get()->parameters[p]) {
-            self->changed_.push_back(p);
-            self->values_.push_back(value);
-          }
-        }
-        return 0;
-      },
-      &context);
+  visit_items(finger_->shape, [&](const model_item& item) {
+    const bool unreached = item.kind == ITEM_CONTACT_THRESHOLD || item.kind == ITEM_BAND_NOISE;
+    const bool fixed = item.kind == ITEM_INITIAL_TORQUE && tendonfmu_is_initialised(get());
+    for (std::uint32_t p = item.first; p < item.first + item.count && !fixed; ++p) {
+      const double value = unreached ? parameter_range_of(&item, p).maximum : numbers[p];
+      if (value != finger_->parameters[p]) {
+        changed_.push_back(p);
+        values_.push_back(value);
+      }
+    }
+  });
   if (tendonfmu_set_parameters(get(), changed_.size(), changed_.data(), values_.data()) != TENDONFMU_OK) {
     throw std::invalid_argument(tendonfmu_last_error(get()));
   }
@@ -82,8 +72,7 @@ bool remembers_numbers(const tendonfmu_finger* finger) {
   return finger->extensions.signals + finger->extensions.friction + finger->memory.elements > 0;
 }
 
-/* --- recordings -----------------------------------------------------------------------------------------------------
- */
+/* --- recordings --------------------------------------------------------------------------------------------------- */
 
 namespace {
 

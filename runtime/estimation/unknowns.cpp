@@ -31,43 +31,41 @@ struct finger_structure {
   std::int64_t initial_first = -1;
 };
 
-void add_side(finger_structure* s, const model_item* item, std::uint32_t first, double threshold) {
+void add_side(finger_structure* s, const model_item& item, std::uint32_t first, double threshold) {
   const unknown_role roles[] = {unknown_role::drop, unknown_role::coulomb, unknown_role::rate, unknown_role::viscous};
   for (std::uint32_t k = 0; k < 4; ++k) {
-    s->candidates.push_back({first + k, roles[k], item->kind, item->joint});
+    s->candidates.push_back({first + k, roles[k], item.kind, item.joint});
   }
   s->statics.push_back(first);
   s->threshold.push_back(threshold);
 }
 
-int add_item(void* context, const model_item* item) {
-  auto* s = static_cast<finger_structure*>(context);
+void add_item(finger_structure* s, const model_item& item) {
   const finger_settings& settings = s->finger->derived.settings;
-  switch (item->kind) {
+  switch (item.kind) {
     case ITEM_JOINT_FRICTION:
     case ITEM_LOAD_FRICTION:
     case ITEM_PULLEY_FRICTION:
     case ITEM_EDGE_FRICTION:
-      for (std::uint32_t side = 0; side < (item->law == LAW_ASYMMETRIC ? 2u : 1u); ++side) {
-        add_side(s, item, item->first + 4 * side,
-                 item->kind <= ITEM_LOAD_FRICTION ? settings.joint_threshold : settings.tendon_threshold);
+      for (std::uint32_t side = 0; side < (item.law == LAW_ASYMMETRIC ? 2u : 1u); ++side) {
+        add_side(s, item, item.first + 4 * side,
+                 item.kind <= ITEM_LOAD_FRICTION ? settings.joint_threshold : settings.tendon_threshold);
       }
       break;
     case ITEM_INITIAL_TORQUE:
-      s->initial_first = item->first;
-      for (std::uint32_t k = 0; k < item->count; ++k) {
-        s->candidates.push_back({item->first + k, unknown_role::value, item->kind, k});
+      s->initial_first = item.first;
+      for (std::uint32_t k = 0; k < item.count; ++k) {
+        s->candidates.push_back({item.first + k, unknown_role::value, item.kind, k});
       }
       break;
     case ITEM_COVER:
     case ITEM_EXTENSION:
-      for (std::uint32_t k = 0; k < item->count; ++k) {
-        s->candidates.push_back({item->first + k, unknown_role::value, item->kind, item->joint});
+      for (std::uint32_t k = 0; k < item.count; ++k) {
+        s->candidates.push_back({item.first + k, unknown_role::value, item.kind, item.joint});
       }
       break;
     default: break;
   }
-  return 0;
 }
 
 std::string path_of(const tendonfmu_finger* finger, std::uint32_t parameter) {
@@ -317,7 +315,7 @@ unknown_list::unknown_list(const tendonfmu_finger* finger, const std::vector<std
   expect_length(group.empty() ? count : group.size(), count, "group", "numbers");
   expect_length(scale.empty() ? count : scale.size(), count, "scale", "numbers");
   finger_structure structure{finger, {}, {}, {}, -1};
-  model_visit(&finger->shape, add_item, &structure);
+  visit_items(finger->shape, [&](const model_item& item) { add_item(&structure, item); });
   column_maker columns(structure, group.empty() ? present_groups(structure) : group, scale);
   list_ = std::move(columns.list);
   start_.assign(finger->start, finger->start + count);

@@ -79,11 +79,6 @@ class finger {
   /* An empty finger, to be assigned to. */
   finger() noexcept = default;
 
-#if defined(TENDONFMU_HAS_EXCEPTIONS)
-  /* As create(); throws an error where the image is refused. */
-  explicit finger(span<const unsigned char> image) : finger(create(image).value()) {}
-#endif
-
   /* A finger in memory of its own, from one malloc(). The image may go afterwards. */
   static result<finger> create(span<const unsigned char> image) noexcept {
     result<finger> made;
@@ -117,9 +112,7 @@ class finger {
     return made;
   }
 
-  finger(finger&& other) noexcept {
-    swap(other);
-  }
+  finger(finger&& other) noexcept { swap(other); }
   finger& operator=(finger&& other) noexcept {
     finger taken(std::move(other));
     swap(taken);
@@ -132,34 +125,18 @@ class finger {
   }
 
   /* False for an empty finger. */
-  explicit operator bool() const noexcept {
-    return handle_ != nullptr;
-  }
-  std::size_t joint_count() const noexcept {
-    return joints_;
-  }
-  std::size_t tendon_count() const noexcept {
-    return tendons_;
-  }
-  bool has_links() const noexcept {
-    return tendonfmu_has_links(handle_) != 0;
-  }
-  bool watches_motors() const noexcept {
-    return tendonfmu_watches_motors(handle_) != 0;
-  }
-  bool watches_sensors() const noexcept {
-    return tendonfmu_watches_sensors(handle_) != 0;
-  }
+  explicit operator bool() const noexcept { return handle_ != nullptr; }
+  std::size_t joint_count() const noexcept { return joints_; }
+  std::size_t tendon_count() const noexcept { return tendons_; }
+  bool has_links() const noexcept { return tendonfmu_has_links(handle_) != 0; }
+  bool watches_motors() const noexcept { return tendonfmu_watches_motors(handle_) != 0; }
+  bool watches_sensors() const noexcept { return tendonfmu_watches_sensors(handle_) != 0; }
 
   /* One line about the last call that failed. Valid until the next call. */
-  const char* last_error() const noexcept {
-    return size_error_[0] ? size_error_ : tendonfmu_last_error(handle_);
-  }
+  const char* last_error() const noexcept { return size_error_[0] ? size_error_ : tendonfmu_last_error(handle_); }
 
   /* For calls of tendonfmu.h beyond these; it stays the finger's. nullptr of an empty one. */
-  tendonfmu_finger* handle() const noexcept {
-    return handle_;
-  }
+  tendonfmu_finger* handle() const noexcept { return handle_; }
 
   /* --- Samples --- */
 
@@ -202,12 +179,8 @@ class finger {
                : status::bad_argument;
   }
 
-  double get_time() const noexcept {
-    return tendonfmu_get_time(handle_);
-  }
-  bool is_initialised() const noexcept {
-    return tendonfmu_is_initialised(handle_) != 0;
-  }
+  double get_time() const noexcept { return tendonfmu_get_time(handle_); }
+  bool is_initialised() const noexcept { return tendonfmu_is_initialised(handle_) != 0; }
 
   /* --- Parameters: between any two steps; a path, or an index found once for all --- */
 
@@ -217,14 +190,10 @@ class finger {
   status set_parameter(const char* path, double value) noexcept {
     return to_status(tendonfmu_set_parameter(handle_, path, value));
   }
-  std::size_t parameter_count() const noexcept {
-    return tendonfmu_parameter_count(handle_);
-  }
+  std::size_t parameter_count() const noexcept { return tendonfmu_parameter_count(handle_); }
 
   /* parameter_count() when there is none. */
-  std::size_t find_parameter(const char* path) const noexcept {
-    return tendonfmu_find_parameter(handle_, path);
-  }
+  std::size_t find_parameter(const char* path) const noexcept { return tendonfmu_find_parameter(handle_, path); }
 
   /* Writes the path and a zero; 80 bytes are enough. */
   status get_parameter_path(std::size_t index, span<char> path) const noexcept {
@@ -254,27 +223,24 @@ class finger {
 
   /* --- State: of state_size() bytes; to be restored into this finger or another one of the same image --- */
 
-  std::size_t state_size() const noexcept {
-    return tendonfmu_state_size(handle_);
-  }
+  std::size_t state_size() const noexcept { return tendonfmu_state_size(handle_); }
   status save_state(span<unsigned char> bytes) const noexcept {
     return to_status(tendonfmu_save_state(handle_, bytes.data(), bytes.size()));
   }
   status restore_state(span<const unsigned char> bytes) noexcept {
     return to_status(tendonfmu_restore_state(handle_, bytes.data(), bytes.size()));
   }
-  status reset() noexcept {
-    return to_status(tendonfmu_reset(handle_));
-  }
+  status reset() noexcept { return to_status(tendonfmu_reset(handle_)); }
 
   /* --- Kernels --- */
 
-  const char* get_kernel() const noexcept {
-    return tendonfmu_get_kernel(handle_);
-  }
-  status set_kernel(const char* name) noexcept {
-    return to_status(tendonfmu_set_kernel(handle_, name));
-  }
+  const char* get_kernel() const noexcept { return tendonfmu_get_kernel(handle_); }
+  status set_kernel(const char* name) noexcept { return to_status(tendonfmu_set_kernel(handle_, name)); }
+
+#if defined(TENDONFMU_HAS_EXCEPTIONS)
+  /* As create(); throws an error where the image is refused. */
+  explicit finger(span<const unsigned char> image) : finger(create(image).value()) {}
+#endif
 
  private:
   void take(tendonfmu_finger* handle, bool owns) noexcept {

@@ -62,8 +62,7 @@ struct recording_arrays {
   int kinematics_source;         /* tendonfmu_kinematics_source */
 };
 
-/* --- all recordings at once -----------------------------------------------------------------------------------------
- */
+/* --- all recordings at once --------------------------------------------------------------------------------------- */
 
 struct fit_options {
   double prior_std = 1.0;       /* of an unknown about its start, in scales; infinite: no prior */
@@ -160,8 +159,7 @@ class estimator {
   std::unique_ptr<fit_problem> problem_;
 };
 
-/* --- sample by sample -----------------------------------------------------------------------------------------------
- */
+/* --- sample by sample --------------------------------------------------------------------------------------------- */
 
 struct learner_options {
   double prior_std = 1.0;       /* standard deviation of an unknown about its start, in scales; above 0 */

@@ -138,11 +138,11 @@ typedef struct tendonfmu_plant_statistics {
 tendonfmu_plant_status tendonfmu_plant_get_statistics(const tendonfmu_plant* plant, tendonfmu_plant_statistics* found);
 
 /* Right-hand side of the differential equations at a given state, for checks against independent implementations.
- *   state        [tendonfmu_plant_order()]: q, q̇, motor position, motor velocity, bristles, heat, motor work, friction
- * work, damping work, push work derivative   [order] jacobian     [order × order] row-major, or NULL */
+ *   state, derivative   [tendonfmu_plant_order()]: q, q̇, motor position, motor velocity, bristles, heat, motor work,
+ *                       friction work, damping work, push work */
 size_t tendonfmu_plant_order(const tendonfmu_plant* plant);
 tendonfmu_plant_status tendonfmu_plant_derivative(const tendonfmu_plant* plant, double time, const double* state,
-                                                  double* derivative, double* jacobian);
+                                                  double* derivative);
 /* The state at the present time. */
 tendonfmu_plant_status tendonfmu_plant_get_continuous_state(const tendonfmu_plant* plant, double* state);
 

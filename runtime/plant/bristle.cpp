@@ -106,4 +106,115 @@ void respond(const law_columns& laws, const response_settings& with, const doubl
   (with.slopes ? respond_all<true> : respond_all<false>)(laws, with, w, responses);
 }
 
+/* --- the law of a site at the present angle ----------------------------------------------------------------------- */
+
+namespace {
+
+const law_side& side_of(const law& one, double v) {
+  return v < 0.0 ? one.negative : one.positive;
+}
+
+/* A number of neighbouring laws in between, and its slope by the angle. */
+struct blend {
+  double share, per_angle; /* of the upper law; 1/width */
+
+  void put(double low, double high, double* value, double* slope) const {
+    *value = low + share * (high - low);
+    *slope = (high - low) * per_angle;
+  }
+};
+
+/* Values are interpolated, not numbers of laws: where neighbours share the Stribeck velocity that is the same; where
+ * they do not, both values are taken here and the row keeps nothing to add. */
+void set_between(const law& low, const law& high, const blend& at, double v, int exponent, std::size_t k,
+                 law_columns* laws) {
+  set_law(low, v, exponent, k, laws);
+  const law_side &a = side_of(low, v), &b = side_of(high, v);
+  at.put(low.break_away, high.break_away, &laws->break_away[k], &laws->break_away_by_angle[k]);
+  at.put(a.viscous, b.viscous, &laws->viscous[k], &laws->viscous_by_angle[k]);
+  if (a.stribeck_rate == b.stribeck_rate) {
+    at.put(a.sliding, b.sliding, &laws->sliding[k], &laws->sliding_by_angle[k]);
+    at.put(a.break_away - a.sliding, b.break_away - b.sliding, &laws->excess[k], &laws->excess_by_angle[k]);
+    return;
+  }
+  const double left_of_a = exponential(-laws->argument[k]), rate_of_a = laws->argument_by_speed[k];
+  const double x = std::fabs(v) * b.stribeck_rate;
+  const double left_of_b = exponential(exponent == 1 ? -x : -x * x);
+  const double rate_of_b = (exponent == 1 ? 1.0 : 2.0 * x) * b.stribeck_rate;
+  const double excess_of_a = (a.break_away - a.sliding) * left_of_a,
+               excess_of_b = (b.break_away - b.sliding) * left_of_b;
+  at.put(a.sliding + excess_of_a, b.sliding + excess_of_b, &laws->sliding[k], &laws->sliding_by_angle[k]);
+  double unused;
+  at.put(-excess_of_a * rate_of_a, -excess_of_b * rate_of_b, &laws->sliding_by_speed[k], &unused);
+  laws->excess[k] = 0.0;
+}
+
+void set_interpolated(const law_by_angle& points, double angle, double v, int exponent, std::size_t k,
+                      law_columns* laws) {
+  const std::vector<double>& angles = points.angles;
+  if (angles.size() < 2 || angle <= angles.front()) {
+    return set_law(points.laws.front(), v, exponent, k, laws);
+  }
+  if (angle >= angles.back()) {
+    return set_law(points.laws.back(), v, exponent, k, laws);
+  }
+  std::size_t upper = 1;
+  while (angles[upper] <= angle) {
+    ++upper;  // few points: a search would take longer
+  }
+  const double per_angle = 1.0 / (angles[upper] - angles[upper - 1]);
+  const blend at = {(angle - angles[upper - 1]) * per_angle, per_angle};
+  set_between(points.laws[upper - 1], points.laws[upper], at, v, exponent, k, laws);
+}
+
+struct scale_and_slope {
+  double level, slope;
+};
+
+/* Level of the sliding friction by the angle of diversion θ, and its slope by θ. The sine with its own coefficient for
+ * each sign of θ is the form of Ludovico et al. (reference [4] of the paper); 1 − e^(−μ|θ|) and, where the tension
+ * falls exponentially anyway, μ|θ| are the capstan's (L. Euler, 1769). */
+scale_and_slope diversion_level(const diversion& turn, double theta) {
+  const double sign = theta < 0.0 ? -1.0 : 1.0;
+  const double coefficient = theta < 0.0 ? turn.negative_coefficient : turn.coefficient;
+  switch (turn.shape) {
+    case diversion::form::sine: {
+      const sine_and_cosine<double> both = sine_cosine(theta);
+      const double turned = both.sine < 0.0 ? -1.0 : 1.0;
+      return {coefficient * turned * both.sine, coefficient * turned * both.cosine};
+    }
+    case diversion::form::capstan_share: {
+      const double rest = exponential(-coefficient * sign * theta);
+      return {1.0 - rest, sign * coefficient * rest};
+    }
+    default: return {coefficient * sign * theta, sign * coefficient};
+  }
+}
+
+void set_diverted(const friction_site& site, double angle, double v, int exponent, std::size_t k, law_columns* laws) {
+  const double theta = site.turn.rest + site.turn.slope * (angle - site.turn.centre);
+  const scale_and_slope level = diversion_level(site.turn, theta);
+  const double scale = level.level / site.turn.normal, by_angle = site.turn.slope * level.slope / site.turn.normal;
+  set_law(site.friction.laws.front(), v, exponent, k, laws);
+  const auto multiply = [&](std::vector<double>& value, std::vector<double>& slope) {
+    slope[k] = by_angle * value[k];
+    value[k] *= scale;
+  };
+  multiply(laws->break_away, laws->break_away_by_angle);
+  multiply(laws->sliding, laws->sliding_by_angle);
+  multiply(laws->excess, laws->excess_by_angle);
+  multiply(laws->viscous, laws->viscous_by_angle);
+}
+
+}  // namespace
+
+void set_site_law(const friction_site& site, double angle, double v, int stribeck_exponent, std::size_t k,
+                  law_columns* laws) {
+  if (site.turn.shape == diversion::form::none) {
+    set_interpolated(site.friction, angle, v, stribeck_exponent, k, laws);
+  } else {
+    set_diverted(site, angle, v, stribeck_exponent, k, laws);
+  }
+}
+
 }  // namespace tendonfmu::plant

@@ -59,4 +59,9 @@ void respond(const law_columns& laws, const response_settings& settings, const d
 /* Puts a law into row k: velocity v, nothing depends on the angle. */
 void set_law(const law& one, double v, int stribeck_exponent, std::size_t k, law_columns* laws);
 
+/* Puts the law of `site` into row k, by working points or by the edge's diversion. angle: rad, of the joint before; v:
+ * m/s. */
+void set_site_law(const friction_site& site, double angle, double v, int stribeck_exponent, std::size_t k,
+                  law_columns* laws);
+
 }  // namespace tendonfmu::plant

@@ -2,6 +2,7 @@
  * or duals, since they depend on the posture. */
 #pragma once
 
+#include "motion.h"
 #include "rigid_body.h"
 
 namespace tendonfmu::plant {
@@ -11,12 +12,6 @@ struct free_push {
   three force{}, point{};
   std::size_t link = 0;
 };
-
-/* N; ramps as raised cosines: no kink that an integrator would stumble over. */
-double push_strength(const push& push, double time);
-
-/* Times at which a push begins, is full, lets go and ends, of all pushes, increasing: no step may pass over one. */
-std::vector<double> push_times(const rig& rig);
 
 /* Depth δ of the finger's point in the obstacle, m (negative: apart), and its growth. */
 template <class T>

@@ -7,7 +7,6 @@
 #include <cstring>
 
 #include "motion.h"
-#include "site_law.h"
 
 namespace tendonfmu::plant {
 namespace {
@@ -45,7 +44,7 @@ dynamics::dynamics(const rig& rig) : rig_(rig), layout_(rig), values_(rig.bristl
 }
 
 /* Moment arms, elongations and forces at the springs. */
-void dynamics::move_tendons(const double* state, bool own_modes) {
+void dynamics::move_tendons(const double* state) {
   const std::size_t n = layout_.joints;
   const double *q = state, *speed = state + layout_.speed();
   evaluation& e = values_;
@@ -66,9 +65,6 @@ void dynamics::move_tendons(const double* state, bool own_modes) {
     const double stretch = state[layout_.motor() + i] - path, stretching = motor_speed - path_speed;
     e.elongation[i] = stretch;
     e.elongation_speed[i] = stretching;
-    if (own_modes) {
-      e.modes.slack[i] = !(stretch > 0.0);
-    }
     const bool slack = e.modes.slack[i];
     const double elastic = stretch * (tendon.stiffness + tendon.hardening * stretch);
     const double total = elastic + tendon.damping * stretching;
@@ -184,16 +180,12 @@ void dynamics::rub_tendons() {
   }
 }
 
-void dynamics::press_stops(const double* state, bool own_modes) {
-  contact_modes& modes = values_.modes;
+void dynamics::press_stops(const double* state) {
+  const contact_modes& modes = values_.modes;
   values_.stop_loss = 0.0;
   for (std::size_t j = 0; j < layout_.joints; ++j) {
     const link& link = rig_.links[j];
     const double q = state[j], speed = state[layout_.speed() + j];
-    if (own_modes) {
-      modes.below[j] = q < link.lower;
-      modes.above[j] = q > link.upper;
-    }
     double torque = 0.0;
     if (modes.below[j] || modes.above[j]) {
       const double spring = link.stop_stiffness * ((modes.below[j] ? link.lower : link.upper) - q);
@@ -252,19 +244,14 @@ void dynamics::evaluate(double time, const double* state, const contact_modes* m
   mass_matrix(rig_, e.motion, e.mass);
   const double no_acceleration[max_joints] = {};
   inverse_dynamics(rig_, e.motion, speed, no_acceleration, e.rigid_torque);
-  if (modes) {
-    e.modes = *modes;
-  }
-  if (!modes) {
-    e.modes.touching = rig_.obstacle.present && penetrate(rig_.obstacle, e.motion).depth > 0.0;
-  }
+  e.modes = modes ? *modes : modes_at(state);
   e.contact = contact_torques(rig_, e.motion, time, inputs.scheduled_pushes, inputs.push, e.modes.touching);
 
   // tendons, friction, stops
-  move_tendons(state, !modes);
+  move_tendons(state);
   bend_bristles(state);
   rub_tendons();
-  press_stops(state, !modes);
+  press_stops(state);
 
   // balance of torques
   double loss = e.spring_loss + e.stop_loss + e.contact.obstacle_loss;
@@ -338,33 +325,17 @@ void dynamics::roots(const double* state, double* root) const {
 contact_modes dynamics::modes_at(const double* state) const {
   double root[max_roots];
   roots(state, root);
-  int found[max_roots];
-  for (std::size_t k = 0; k < root_count(); ++k) {
-    found[k] = root[k] > 0.0 ? 1 : -1;
-  }
   contact_modes modes;
-  switch_modes(found, &modes);
+  visit_modes(&modes, [&](std::size_t k, bool& mode, bool when_positive) { mode = (root[k] > 0.0) == when_positive; });
   return modes;
 }
 
 void dynamics::switch_modes(const int* found, contact_modes* modes) const {
-  const std::size_t n = layout_.joints, m = layout_.tendons;
-  for (std::size_t i = 0; i < m; ++i) {
-    if (found[i] != 0) {
-      modes->slack[i] = found[i] < 0;
+  visit_modes(modes, [&](std::size_t k, bool& mode, bool when_positive) {
+    if (found[k] != 0) {
+      mode = (found[k] > 0) == when_positive;
     }
-  }
-  for (std::size_t j = 0; j < n; ++j) {
-    if (found[m + 2 * j] != 0) {
-      modes->below[j] = found[m + 2 * j] > 0;
-    }
-    if (found[m + 2 * j + 1] != 0) {
-      modes->above[j] = found[m + 2 * j + 1] > 0;
-    }
-  }
-  if (rig_.obstacle.present && found[m + 2 * n] != 0) {
-    modes->touching = found[m + 2 * n] > 0;
-  }
+  });
 }
 
 }  // namespace tendonfmu::plant

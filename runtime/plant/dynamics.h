@@ -104,12 +104,27 @@ class dynamics {
   void roots(const double* state, double* root) const;
   /* Modes after the roots with found[k] != 0 were crossed in that direction (> 0: rising). */
   void switch_modes(const int* found, contact_modes* modes) const;
+  /* Calls visit(k, mode, when_positive) for the mode of each root k, and what it is while the root is positive. */
+  template <class Modes, class Visit>
+  void visit_modes(Modes* modes, Visit visit) const {
+    const std::size_t n = layout_.joints, m = layout_.tendons;
+    for (std::size_t i = 0; i < m; ++i) {
+      visit(i, modes->slack[i], false);
+    }
+    for (std::size_t j = 0; j < n; ++j) {
+      visit(m + 2 * j, modes->below[j], true);
+      visit(m + 2 * j + 1, modes->above[j], true);
+    }
+    if (rig_.obstacle.present) {
+      visit(m + 2 * n, modes->touching, true);
+    }
+  }
 
  private:
-  void move_tendons(const double* state, bool own_modes);
+  void move_tendons(const double* state);
   void bend_bristles(const double* state);
   void rub_tendons();
-  void press_stops(const double* state, bool own_modes);
+  void press_stops(const double* state);
 
   const rig& rig_;
   state_layout layout_;

@@ -9,7 +9,7 @@
 #include <new>
 #include <utility>
 
-#include "sentence.h"
+#include "description_error.h"
 
 namespace tendonfmu::plant {
 namespace {
@@ -273,31 +273,15 @@ int integrator::root_functions(solver_number, N_Vector state, solver_number* roo
   auto* self = static_cast<integrator*>(data);
   return self->kept([&] {
     self->equations_.roots(N_VGetArrayPointer(state), root);
-    self->avoid_zeros(root);
+    // CVODE overlooks a function that is 0 where it starts: a joint at rest on its stop would pass through it. There, 0
+    // stands for the side that holds.
+    self->equations_.visit_modes(&self->modes_, [root](std::size_t k, bool mode, bool when_positive) {
+      if (root[k] == 0.0) {
+        root[k] = mode == when_positive ? 1e-100 : -1e-100;
+      }
+    });
     return 0;
   });
-}
-
-/* CVODE overlooks a function that is 0 where it starts: a joint at rest on its stop would pass through it. There, 0
- * stands for the side that holds. */
-void integrator::avoid_zeros(double* root) const {
-  const auto hold = [&root](bool positive) {
-    if (*root == 0.0) {
-      *root = positive ? 1e-100 : -1e-100;
-    }
-    ++root;
-  };
-  const state_layout& at = equations_.layout();
-  for (std::size_t i = 0; i < at.tendons; ++i) {
-    hold(!modes_.slack[i]);
-  }
-  for (std::size_t j = 0; j < at.joints; ++j) {
-    hold(modes_.below[j]);
-    hold(modes_.above[j]);
-  }
-  if (equations_.the_rig().obstacle.present) {
-    hold(modes_.touching);
-  }
 }
 
 int integrator::prepare(solver_number time, N_Vector state, N_Vector, SUNMatrix, solver_flag old_will_do,

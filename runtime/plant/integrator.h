@@ -73,7 +73,6 @@ class integrator {
   void set_stop(const commands& inputs);
   void count();
   [[noreturn]] void fail(int flag, double time);
-  void avoid_zeros(double* root) const;
 
   // what CVODE calls: C, which no exception may pass
   template <class Call>

@@ -9,16 +9,11 @@ namespace {
 constexpr int lanes = 8;
 using slopes = dual<lanes>;
 
-}  // namespace
+/* Rows of slopes below the n torques. */
+enum power : std::size_t { friction_power, motor_power, damping_power, push_power, powers };
+constexpr power order_of_works[powers] = {motor_power, friction_power, damping_power, push_power};
 
-void linearisation::gradient::set_zero() {
-  by_angle.setZero();
-  by_speed.setZero();
-  by_motor.setZero();
-  by_motor_speed.setZero();
-  by_bristle.setZero();
-  by_heat = 0.0;
-}
+}  // namespace
 
 linearisation::linearisation(const rig& rig)
     : rig_(rig),
@@ -30,35 +25,26 @@ linearisation::linearisation(const rig& rig)
       damping_(2.0 * rig.servo_damping * omega_),
       heat_rate_(1.0 / rig.friction.heat_time),
       mass_(n_, n_),
-      by_angle_(n_ + 1, n_),
-      by_speed_(n_ + 1, n_),
-      by_motor_(n_ + 1, m_),
-      by_motor_speed_(n_ + 1, m_),
-      by_bristle_(n_ + 1, k_),
-      by_heat_(n_ + 1),
+      by_angle_(n_ + powers, n_),
+      by_speed_(n_ + powers, n_),
+      by_motor_(n_ + powers, m_),
+      by_motor_speed_(n_ + powers, m_),
+      by_bristle_(n_ + powers, k_),
+      by_heat_(n_ + powers),
       bristle_own_(k_),
       bristle_by_angle_(k_, n_),
       bristle_by_speed_(k_, n_),
-      bristle_factor_(k_) {
-  for (gradient* one : {&motor_power_, &loss_, &push_power_}) {
-    one->by_angle.resize(n_);
-    one->by_speed.resize(n_);
-    one->by_motor.resize(m_);
-    one->by_motor_speed.resize(m_);
-    one->by_bristle.resize(k_);
-  }
-}
+      bristle_factor_(k_) {}
 
 void linearisation::take(const dynamics& equations, const double* state, const commands& inputs) {
   const evaluation& e = equations.last();
   const double* speed = state + layout_.speed();
   mass_ = Eigen::Map<const matrix>(e.mass, n_, n_);
-  by_angle_.setZero();
-  by_speed_.setZero();
+  for (matrix* slopes :
+       {&by_angle_, &by_speed_, &by_motor_, &by_motor_speed_, &by_bristle_, &bristle_by_angle_, &bristle_by_speed_}) {
+    slopes->setZero();
+  }
   by_heat_.setZero();
-  by_bristle_.setZero();
-  bristle_by_angle_.setZero();
-  bristle_by_speed_.setZero();
 
   // torque that tendons and joint friction pass on
   for (std::size_t i = 0; i < m_; ++i) {
@@ -151,7 +137,7 @@ void linearisation::joint_slopes(const evaluation& e) {
   }
 }
 
-/* Row n: the power of friction, (torque at the springs − passed torque)ᵀ q̇. */
+/* The power of friction, (torque at the springs − passed torque)ᵀ q̇. */
 void linearisation::power_row(const evaluation& e, const double* speed) {
   const Eigen::Map<const Eigen::VectorXd> v(speed, n_);
   by_angle_.row(n_) = -v.transpose() * by_angle_.topRows(n_);
@@ -201,15 +187,13 @@ void linearisation::diagonal_slopes(const evaluation& e, const double* state) {
 
 /* Power of the motors and of the dampers; the pushes' and the obstacle's come with the bodies. */
 void linearisation::work_rows(const evaluation& e, const double* state) {
-  for (gradient* one : {&motor_power_, &loss_, &push_power_}) {
-    one->set_zero();
-  }
+  const std::size_t motors = n_ + motor_power, dampers = n_ + damping_power;
   const double* speed = state + layout_.speed();
   for (std::size_t i = 0; i < m_; ++i) {
     const double *arm = &e.arm[i * n_], *arm_slope = &e.arm_slope[i * n_];
     const double motor_speed = state[layout_.motor_speed() + i];
-    motor_power_.by_motor[i] = motor_speed * e.force_by_elongation[i];
-    motor_power_.by_motor_speed[i] = e.force[i] + motor_speed * e.force_by_speed[i];
+    by_motor_(motors, i) = motor_speed * e.force_by_elongation[i];
+    by_motor_speed_(motors, i) = e.force[i] + motor_speed * e.force_by_speed[i];
     // (f − f_elastic) ė: by ė, and by the elongation only while the clipped damper has left the elastic part behind
     const double stretch = e.elongation[i], stretching = e.elongation_speed[i];
     const tendon& tendon = rig_.tendons[i];
@@ -217,28 +201,28 @@ void linearisation::work_rows(const evaluation& e, const double* state) {
     const double stiffness = e.modes.slack[i] ? 0.0 : tendon.stiffness + 2.0 * tendon.hardening * stretch;
     const double by_speed = e.force[i] - elastic + e.force_by_speed[i] * stretching;
     const double by_stretch = (e.force_by_elongation[i] - stiffness) * stretching;
-    loss_.by_motor[i] = by_stretch;
-    loss_.by_motor_speed[i] = by_speed;
+    by_motor_(dampers, i) = by_stretch;
+    by_motor_speed_(dampers, i) = by_speed;
     for (std::size_t k = 0; k < n_; ++k) {
-      motor_power_.by_angle[k] -=
+      by_angle_(motors, k) -=
           motor_speed * (e.force_by_elongation[i] * arm[k] + e.force_by_speed[i] * arm_slope[k] * speed[k]);
-      motor_power_.by_speed[k] -= motor_speed * e.force_by_speed[i] * arm[k];
-      loss_.by_angle[k] -= by_stretch * arm[k] + by_speed * arm_slope[k] * speed[k];
-      loss_.by_speed[k] -= by_speed * arm[k];
+      by_speed_(motors, k) -= motor_speed * e.force_by_speed[i] * arm[k];
+      by_angle_(dampers, k) -= by_stretch * arm[k] + by_speed * arm_slope[k] * speed[k];
+      by_speed_(dampers, k) -= by_speed * arm[k];
     }
   }
   for (std::size_t j = 0; j < n_; ++j) {
     const link& link = rig_.links[j];
-    loss_.by_speed[j] += 2.0 * link.damping * speed[j];
+    by_speed_(dampers, j) += 2.0 * link.damping * speed[j];
     if (!e.modes.below[j] && !e.modes.above[j]) {
       continue;
     }
     const double spring = link.stop_stiffness * ((e.modes.below[j] ? link.lower : link.upper) - state[j]);
     if (e.stop_torque[j] != 0.0) {
-      loss_.by_speed[j] += 2.0 * link.stop_damping * speed[j];
+      by_speed_(dampers, j) += 2.0 * link.stop_damping * speed[j];
     } else {
-      loss_.by_speed[j] += spring;
-      loss_.by_angle[j] -= link.stop_stiffness * speed[j];
+      by_speed_(dampers, j) += spring;
+      by_angle_(dampers, j) -= link.stop_stiffness * speed[j];
     }
   }
 }
@@ -252,19 +236,16 @@ void linearisation::wrist_slopes(const evaluation& e, const double* speed) {
     const double by_force = lever * (1.0 - e.loss_by_force[s]), by_share = -lever * e.loss_by_share[s];
     const double *arm = &e.arm[i * n_], *arm_slope = &e.arm_slope[i * n_];
     const double by_path_speed = by_share * e.responses.share_by_velocity[s] - by_force * e.force_by_speed[i];
-    const auto add = [&](double& friction, double& outside, double slope) {
-      friction += slope;
-      outside += slope;
-    };
-    for (std::size_t k = 0; k < n_; ++k) {
-      add(by_speed_(n_, k), motor_power_.by_speed[k], by_path_speed * arm[k]);
-      add(by_angle_(n_, k), motor_power_.by_angle[k],
-          by_path_speed * arm_slope[k] * speed[k] - by_force * e.force_by_elongation[i] * arm[k]);
+    for (const std::size_t row : {n_ + friction_power, n_ + motor_power}) {
+      for (std::size_t k = 0; k < n_; ++k) {
+        by_speed_(row, k) += by_path_speed * arm[k];
+        by_angle_(row, k) += by_path_speed * arm_slope[k] * speed[k] - by_force * e.force_by_elongation[i] * arm[k];
+      }
+      by_motor_(row, i) += by_force * e.force_by_elongation[i];
+      by_motor_speed_(row, i) += by_force * e.force_by_speed[i];
+      by_bristle_(row, s) += by_share * e.responses.share_by_bristle[s];
+      by_heat_[row] += by_share * e.responses.share_by_level[s] * e.level_by_heat;
     }
-    add(by_motor_(n_, i), motor_power_.by_motor[i], by_force * e.force_by_elongation[i]);
-    add(by_motor_speed_(n_, i), motor_power_.by_motor_speed[i], by_force * e.force_by_speed[i]);
-    add(by_bristle_(n_, s), motor_power_.by_bristle[s], by_share * e.responses.share_by_bristle[s]);
-    add(by_heat_[n_], motor_power_.by_heat, by_share * e.responses.share_by_level[s] * e.level_by_heat);
   }
 }
 
@@ -289,13 +270,13 @@ void linearisation::body_slopes(const evaluation& e, const double* state, const 
         contact_torques(rig_, motion, e.time, inputs.scheduled_pushes, inputs.push, e.modes.touching);
     inverse_dynamics(rig_, motion, speed, e.acceleration, needed);
     for (std::size_t d = first; d < std::min(first + lanes, directions); ++d) {
-      const bool is_angle = d < n_;
-      const std::size_t column = is_angle ? d : d - n_, lane = d - first;
+      const std::size_t lane = d - first;
+      auto column = d < n_ ? by_angle_.col(d) : by_speed_.col(d - n_);
       for (std::size_t j = 0; j < n_; ++j) {
-        (is_angle ? by_angle_ : by_speed_)(j, column) += contact.torque[j].slope[lane] - needed[j].slope[lane];
+        column[j] += contact.torque[j].slope[lane] - needed[j].slope[lane];
       }
-      (is_angle ? loss_.by_angle : loss_.by_speed)[column] += contact.obstacle_loss.slope[lane];
-      (is_angle ? push_power_.by_angle : push_power_.by_speed)[column] += contact.push_power.slope[lane];
+      column[n_ + damping_power] += contact.obstacle_loss.slope[lane];
+      column[n_ + push_power] += contact.push_power.slope[lane];
     }
   }
 }
@@ -305,8 +286,8 @@ bool linearisation::factor(double gamma) {
   small reduced(n_ + 1, n_ + 1);
   reduced.setZero();
   reduced.topLeftCorner(n_, n_) = mass_;
-  reduced.leftCols(n_) -= gamma * (by_speed_ + gamma * by_angle_);
-  reduced.col(n_) = -gamma * by_heat_;
+  reduced.leftCols(n_) -= gamma * (by_speed_ + gamma * by_angle_).topRows(n_ + 1);
+  reduced.col(n_) = -gamma * by_heat_.head(n_ + 1);
   reduced(n_, n_) += 1.0 + gamma * heat_rate_;
   for (std::size_t s = 0; s < k_; ++s) {
     const double factor = 1.0 / (1.0 - gamma * bristle_own_[s]);
@@ -345,8 +326,9 @@ void linearisation::solve(double* b) const {
   // speeds and heat: bristles and angles, as far as they are known without the speeds, go to the right
   bristle += g * (bristle_by_angle_ * angle);
   bristle.array() *= bristle_factor_.array();
-  small_vector right =
-      g * (by_angle_ * angle + by_motor_ * motor + by_motor_speed_ * motor_speed + by_bristle_ * bristle);
+  const std::size_t rows = n_ + 1;
+  small_vector right = g * (by_angle_.topRows(rows) * angle + by_motor_.topRows(rows) * motor +
+                            by_motor_speed_.topRows(rows) * motor_speed + by_bristle_.topRows(rows) * bristle);
   right.head(n_) += mass_ * speed;
   right[n_] += b[layout_.heat()];
   right = reduced_.solve(right);
@@ -356,62 +338,12 @@ void linearisation::solve(double* b) const {
   const small_vector turned = g * speed;
   bristle.array() += g * bristle_factor_.array() * (bristle_by_speed_ * speed + bristle_by_angle_ * turned).array();
   angle += turned;
-  const auto grown = [&](const gradient& one) {
-    return g * (one.by_angle.dot(angle) + one.by_speed.dot(speed) + one.by_motor.dot(motor) +
-                one.by_motor_speed.dot(motor_speed) + one.by_bristle.dot(bristle) + one.by_heat * right[n_]);
-  };
-  b[layout_.motor_work()] += grown(motor_power_);
-  b[layout_.friction_work()] +=
-      g * (by_angle_.row(n_).dot(angle) + by_speed_.row(n_).dot(speed) + by_motor_.row(n_).dot(motor) +
-           by_motor_speed_.row(n_).dot(motor_speed) + by_bristle_.row(n_).dot(bristle) + by_heat_[n_] * right[n_]);
-  b[layout_.damping_work()] += grown(loss_);
-  b[layout_.push_work()] += grown(push_power_);
-}
-
-void linearisation::dense(double* jacobian) const {
-  const std::size_t size = layout_.size();
-  Eigen::Map<matrix> j(jacobian, size, size);
-  j.setZero();
-  const std::size_t motor = layout_.motor(), motor_speed = layout_.motor_speed(), bristle = layout_.bristle();
-  j.block(0, n_, n_, n_).setIdentity();
-  const matrix inverse = matrix(mass_).inverse();
-  const auto rows = [&](auto target, const auto& block) { target = inverse * block.topRows(n_); };
-  rows(j.block(n_, 0, n_, n_), by_angle_);
-  rows(j.block(n_, n_, n_, n_), by_speed_);
-  rows(j.block(n_, motor, n_, m_), by_motor_);
-  rows(j.block(n_, motor_speed, n_, m_), by_motor_speed_);
-  rows(j.block(n_, bristle, n_, k_), by_bristle_);
-  rows(j.block(n_, layout_.heat(), n_, 1), by_heat_);
-  for (std::size_t i = 0; i < m_; ++i) {
-    j(motor + i, motor_speed + i) = 1.0;
-    j(motor_speed + i, motor + i) = -omega_ * omega_;
-    j(motor_speed + i, motor_speed + i) = -damping_;
+  for (std::size_t k = 0; k < powers; ++k) {  // in the order of the works in the state
+    const std::size_t row = n_ + order_of_works[k];
+    b[layout_.motor_work() + k] +=
+        g * (by_angle_.row(row).dot(angle) + by_speed_.row(row).dot(speed) + by_motor_.row(row).dot(motor) +
+             by_motor_speed_.row(row).dot(motor_speed) + by_bristle_.row(row).dot(bristle) + by_heat_[row] * right[n_]);
   }
-  j.block(bristle, 0, k_, n_) = bristle_by_angle_;
-  j.block(bristle, n_, k_, n_) = bristle_by_speed_;
-  for (std::size_t s = 0; s < k_; ++s) {
-    j(bristle + s, bristle + s) = bristle_own_[s];
-  }
-  for (const std::size_t row : {layout_.heat(), layout_.friction_work()}) {
-    j.block(row, 0, 1, n_) = by_angle_.row(n_);
-    j.block(row, n_, 1, n_) = by_speed_.row(n_);
-    j.block(row, motor, 1, m_) = by_motor_.row(n_);
-    j.block(row, motor_speed, 1, m_) = by_motor_speed_.row(n_);
-    j.block(row, bristle, 1, k_) = by_bristle_.row(n_);
-    j(row, layout_.heat()) = by_heat_[n_];
-  }
-  j(layout_.heat(), layout_.heat()) -= heat_rate_;
-  const auto work = [&](std::size_t row, const gradient& one) {
-    j.block(row, 0, 1, n_) = one.by_angle.transpose();
-    j.block(row, n_, 1, n_) = one.by_speed.transpose();
-    j.block(row, motor, 1, m_) = one.by_motor.transpose();
-    j.block(row, motor_speed, 1, m_) = one.by_motor_speed.transpose();
-    j.block(row, bristle, 1, k_) = one.by_bristle.transpose();
-    j(row, layout_.heat()) = one.by_heat;
-  };
-  work(layout_.motor_work(), motor_power_);
-  work(layout_.damping_work(), loss_);
-  work(layout_.push_work(), push_power_);
 }
 
 }  // namespace tendonfmu::plant

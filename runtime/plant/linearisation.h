@@ -24,21 +24,11 @@ class linearisation {
   /* Overwrites b [size] by x. */
   void solve(double* b) const;
 
-  /* J, row-major [size × size]. */
-  void dense(double* jacobian) const;
-
  private:
   using matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   using vector = Eigen::VectorXd;
   using small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, max_joints + 1, max_joints + 1>;
   using small_vector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, max_joints + 1, 1>;
-
-  /* Slopes of one scalar by angles, speeds, motor positions and motor speeds, bristles and heat. */
-  struct gradient {
-    vector by_angle, by_speed, by_motor, by_motor_speed, by_bristle;
-    double by_heat = 0.0;
-    void set_zero();
-  };
 
   void tendon_slopes(const evaluation& e, const double* speed, std::size_t tendon);
   void joint_slopes(const evaluation& e);
@@ -53,14 +43,14 @@ class linearisation {
   std::size_t n_, m_, k_;
   double omega_, damping_, heat_rate_;
 
-  // rows 0..n-1: torque on the joints (before the mass matrix); row n: friction power, which heats
+  // rows 0..n-1: torque on the joints (before the mass matrix); then the powers of friction (which heats), of motors,
+  // dampers and pushes
   small mass_;
   matrix by_angle_, by_speed_, by_motor_, by_motor_speed_, by_bristle_;
-  small_vector by_heat_;
+  vector by_heat_;
   // bristles: own slope, and by angles and speeds [k × n]
   vector bristle_own_;
   matrix bristle_by_angle_, bristle_by_speed_;
-  gradient motor_power_, loss_, push_power_;
 
   double gamma_ = 0.0;
   vector bristle_factor_; /* 1/(1 − γ own) */

@@ -13,6 +13,17 @@ double smooth_step(double u) {
   return u * u * u * (10.0 + u * (-15.0 + 6.0 * u));
 }
 
+void command_of(const rig& rig, const double* angle, double pretension, double* command) {
+  for (std::size_t i = 0; i < rig.tendon_count(); ++i) {
+    const tendon& tendon = rig.tendons[i];
+    double path = 0.0;
+    for (std::size_t j = 0; j < rig.joint_count(); ++j) {
+      path += path_of(tendon.arms[j], angle[j]);
+    }
+    command[i] = path + elongation_of(tendon, pretension * rig.null_vector[i]);
+  }
+}
+
 }  // namespace
 
 double at_time(const knots& knots, double time) {
@@ -56,21 +67,6 @@ void desired_angles(const rig& rig, double time, double* angle) {
   }
 }
 
-namespace {
-
-void command_of(const rig& rig, const double* angle, double pretension, double* command) {
-  for (std::size_t i = 0; i < rig.tendon_count(); ++i) {
-    const tendon& tendon = rig.tendons[i];
-    double path = 0.0;
-    for (std::size_t j = 0; j < rig.joint_count(); ++j) {
-      path += path_of(tendon.arms[j], angle[j]);
-    }
-    command[i] = path + elongation_of(tendon, pretension * rig.null_vector[i]);
-  }
-}
-
-}  // namespace
-
 void scheduled_command(const rig& rig, double time, double extra, double* command) {
   double angle[max_joints];
   desired_angles(rig, time, angle);
@@ -81,6 +77,35 @@ void hold_command(const rig& rig, double* command) {
   double angle[max_joints];
   desired_angles(rig, 0.0, angle);
   command_of(rig, angle, at_time(rig.pretension, 0.0), command);
+}
+
+double push_strength(const push& push, double time) {
+  const double since = time - push.start;
+  const double left = push.rise + push.hold + push.fall - since;
+  if (since <= 0.0 || left <= 0.0) {
+    return 0.0;
+  }
+  if (since < push.rise) {
+    return 0.5 * push.force * (1.0 - cosine(pi * since / push.rise));
+  }
+  if (left < push.fall) {
+    return 0.5 * push.force * (1.0 - cosine(pi * left / push.fall));
+  }
+  return push.force;
+}
+
+std::vector<double> push_times(const rig& rig) {
+  std::vector<double> times;
+  for (const push& push : rig.pushes) {
+    double time = push.start;
+    times.push_back(time);
+    for (const double part : {push.rise, push.hold, push.fall}) {
+      times.push_back(time += part);
+    }
+  }
+  std::sort(times.begin(), times.end());
+  times.erase(std::unique(times.begin(), times.end()), times.end());
+  return times;
 }
 
 }  // namespace tendonfmu::plant

@@ -1,4 +1,4 @@
-/* What the motors are commanded: desired joint angles and pretension over time. */
+/* What happens over time: what the motors are commanded (joint angles, pretension), and the pushes. */
 #pragma once
 
 #include "elementary.h"
@@ -45,5 +45,11 @@ void scheduled_command(const rig& rig, double time, double extra, double* comman
 
 /* Motor positions that hold the first posture with the first pretension, [m]. */
 void hold_command(const rig& rig, double* command);
+
+/* N; ramps as raised cosines: no kink that an integrator would stumble over. */
+double push_strength(const push& push, double time);
+
+/* Times at which a push begins, is full, lets go and ends, of all pushes, increasing: no step may pass over one. */
+std::vector<double> push_times(const rig& rig);
 
 }  // namespace tendonfmu::plant

@@ -7,7 +7,6 @@
 
 #include "dynamics.h"
 #include "integrator.h"
-#include "linearisation.h"
 #include "sensor_bank.h"
 #include "tendonfmu_plant.h"
 
@@ -48,7 +47,7 @@ class plant {
   void restore(const void* bytes, std::size_t size);
 
   const std::vector<double>& continuous_state() const { return now_.state; }
-  void derivative(double time, const double* state, double* derivative, double* jacobian) const;
+  void derivative(double time, const double* state, double* derivative) const;
 
  private:
   void need_initialised() const;

@@ -137,8 +137,9 @@ struct sensor {
 };
 
 struct sensors {
+  enum quantity { tendon_force, tendon_position, joint_position, joint_velocity, external_torque, quantities };
   double rate = 1000.0;
-  sensor tendon_force, tendon_position, joint_position, joint_velocity, external_torque;
+  sensor of[quantities];
 };
 
 struct rig {
@@ -169,5 +170,10 @@ struct rig {
   /* q, q̇, motor position and velocity, bristles, heat, four works */
   std::size_t order() const { return 2 * joint_count() + 2 * tendon_count() + bristle_count() + 5; }
 };
+
+/* From the text of an expanded rig (docs/reference/rig.md). Throws description_error: key path, value, expectation,
+ * unit.
+ */
+rig read_rig(const char* text, std::size_t size);
 
 }  // namespace tendonfmu::plant

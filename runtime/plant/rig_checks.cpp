@@ -5,9 +5,7 @@
 #include "description_error.h"
 #include "dynamics.h"
 #include "motion.h"
-#include "rig_parts.h"
-#include "sentence.h"
-#include "site_law.h"
+#include "rig_values.h"
 
 namespace tendonfmu::plant {
 namespace {

@@ -1,7 +1,6 @@
 #include <algorithm>
 
 #include "description_error.h"
-#include "rig_parts.h"
 #include "rig_values.h"
 
 namespace tendonfmu::plant {

@@ -39,4 +39,11 @@ std::size_t index_in(const json_node& parent, const char* key, std::size_t low, 
 /* Position of a text among `choices`; the first where it is absent. */
 std::size_t choice_in(const json_node& parent, const char* key, const std::vector<std::string>& choices);
 
+/* The tendons' friction: sites in the order in which a tendon passes them. The finger has been checked by the core. */
+void read_friction(const json_node& finger, const json_node& physics, rig* rig);
+
+/* What no single number shows: a pretension that can be held, a start within the limits, stiffness within reason,
+ * friction that leaves some tension. Throws description_error. Sets the null vector. */
+void check_rig(const json_node& document, rig* rig);
+
 }  // namespace tendonfmu::plant

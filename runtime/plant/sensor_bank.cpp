@@ -3,30 +3,19 @@
 #include <algorithm>
 #include <cmath>
 
-#include "random_numbers.h"
+#include "elementary.h"
 
 namespace tendonfmu::plant {
 
-readings::readings(std::size_t joints, std::size_t tendons)
-    : tendon_force(tendons),
-      tendon_position(tendons),
-      joint_position(joints),
-      joint_velocity(joints),
-      external_torque(joints) {}
-
-sensor_bank::sensor_bank(const rig& rig) : rate_(rig.sensors.rate), newest_(rig.joint_count(), rig.tendon_count()) {
-  const std::size_t n = rig.joint_count(), m = rig.tendon_count();
-  std::uint32_t kind = 0;
-  const auto add = [&](const sensor& with, std::size_t channels) {
+sensor_bank::sensor_bank(const rig& rig) : rate_(rig.sensors.rate) {
+  std::uint32_t first_channel = 0;
+  for (const sensor& with : rig.sensors.of) {
+    const std::size_t channels = with.gain.size();
     const std::size_t depth = with.delay > 0.0 ? static_cast<std::size_t>(std::ceil(with.delay * rate_)) + 2 : 0;
-    lines_.push_back({&with, 256 * kind++, channels, depth, std::vector<double>(depth * channels, 0.0),
-                      std::vector<double>(channels, 0.0)});
-  };
-  add(rig.sensors.tendon_force, m);
-  add(rig.sensors.tendon_position, m);
-  add(rig.sensors.joint_position, n);
-  add(rig.sensors.joint_velocity, n);
-  add(rig.sensors.external_torque, n);
+    const std::vector<double> zeros(channels, 0.0);
+    lines_.push_back({&with, first_channel, channels, depth, std::vector<double>(depth * channels), zeros, zeros});
+    first_channel += 256;
+  }
 }
 
 void sensor_bank::clear() {
@@ -34,6 +23,12 @@ void sensor_bank::clear() {
     std::fill(one.past.begin(), one.past.end(), 0.0);
     std::fill(one.play.begin(), one.play.end(), 0.0);
   }
+}
+
+readings sensor_bank::newest() const {
+  readings all;
+  std::transform(lines_.begin(), lines_.end(), all.begin(), [](const line& one) { return one.newest.data(); });
+  return all;
 }
 
 /* Linear between samples; before the first one its value. */
@@ -48,8 +43,7 @@ double sensor_bank::delayed(const line& line, double number, std::size_t channel
   return back == whole ? newer : newer + (back - whole) * (at(whole + 1.0) - newer);
 }
 
-void sensor_bank::take(line* line, std::uint64_t number, std::uint64_t seed, const std::vector<double>& exact,
-                       std::vector<double>* shown) {
+void sensor_bank::take(line* line, std::uint64_t number, std::uint64_t seed, const double* exact) {
   const sensor& with = *line->with;
   const bool late = line->depth > 0;
   const std::size_t row = late ? number % line->depth * line->channels : 0;
@@ -61,29 +55,28 @@ void sensor_bank::take(line* line, std::uint64_t number, std::uint64_t seed, con
       line->play[c] = number == 0 ? x : std::clamp(line->play[c], x - half, x + half);
       x = line->play[c];
     }
-    (*shown)[c] = x;
+    line->newest[c] = x;
     if (late) {
       line->past[row + c] = x;
     }
   }
   for (std::size_t c = 0; c < line->channels; ++c) {
-    double x = with.gain[c] * (late ? delayed(*line, static_cast<double>(number), c) : (*shown)[c]) + with.offset[c];
+    double x =
+        with.gain[c] * (late ? delayed(*line, static_cast<double>(number), c) : line->newest[c]) + with.offset[c];
     if (with.noise > 0.0) {
       x += with.noise * normal_number(seed, line->first_channel + static_cast<std::uint32_t>(c), number);
     }
     if (with.resolution > 0.0) {
       x = with.resolution * std::floor(x / with.resolution + 0.5);
     }
-    (*shown)[c] = x;
+    line->newest[c] = x;
   }
 }
 
 void sensor_bank::sample(std::uint64_t number, std::uint64_t seed, const readings& exact) {
-  take(&lines_[0], number, seed, exact.tendon_force, &newest_.tendon_force);
-  take(&lines_[1], number, seed, exact.tendon_position, &newest_.tendon_position);
-  take(&lines_[2], number, seed, exact.joint_position, &newest_.joint_position);
-  take(&lines_[3], number, seed, exact.joint_velocity, &newest_.joint_velocity);
-  take(&lines_[4], number, seed, exact.external_torque, &newest_.external_torque);
+  for (std::size_t k = 0; k < lines_.size(); ++k) {
+    take(&lines_[k], number, seed, exact[k]);
+  }
 }
 
 }  // namespace tendonfmu::plant

@@ -1,6 +1,7 @@
 /* What the sensors make of the true signals: play, delay, gain and offset, noise, resolution, in this order. */
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -8,14 +9,8 @@
 
 namespace tendonfmu::plant {
 
-/* A value of every sensor. */
-struct readings {
-  std::vector<double> tendon_force, tendon_position;                   /* [m] */
-  std::vector<double> joint_position, joint_velocity, external_torque; /* [n] */
-
-  readings() = default;
-  readings(std::size_t joints, std::size_t tendons);
-};
+/* The values of every quantity: [m] of tendons, [n] of joints. */
+using readings = std::array<const double*, sensors::quantities>;
 
 class sensor_bank {
  public:
@@ -25,21 +20,19 @@ class sensor_bank {
   void sample(std::uint64_t number, std::uint64_t seed, const readings& exact);
 
   /* The newest sample. */
-  const readings& newest() const { return newest_; }
+  readings newest() const;
 
   void clear();
 
   /* Shows each list of remembered numbers to `visit`, in one order: saved states. */
   template <class Bank, class Visit>
   static void visit_state(Bank& bank, Visit visit) {
-    auto& newest = bank.newest_;
-    for (auto* values : {&newest.tendon_force, &newest.tendon_position, &newest.joint_position, &newest.joint_velocity,
-                         &newest.external_torque}) {
-      visit(values->data(), values->size());
+    for (auto& line : bank.lines_) {
+      visit(line.newest);
     }
-    for (auto& one : bank.lines_) {
-      visit(one.past.data(), one.past.size());
-      visit(one.play.data(), one.play.size());
+    for (auto& line : bank.lines_) {
+      visit(line.past);
+      visit(line.play);
     }
   }
 
@@ -49,17 +42,16 @@ class sensor_bank {
     const sensor* with;
     std::uint32_t first_channel;
     std::size_t channels, depth;
-    std::vector<double> past; /* [depth × channels], a ring; none without a delay */
-    std::vector<double> play; /* [channels] what the far end of a play shows */
+    std::vector<double> past;   /* [depth × channels], a ring; none without a delay */
+    std::vector<double> play;   /* [channels] what the far end of a play shows */
+    std::vector<double> newest; /* [channels] */
   };
 
-  void take(line* line, std::uint64_t number, std::uint64_t seed, const std::vector<double>& exact,
-            std::vector<double>* shown);
+  void take(line* line, std::uint64_t number, std::uint64_t seed, const double* exact);
   double delayed(const line& line, double number, std::size_t channel) const;
 
   double rate_;
-  std::vector<line> lines_;
-  readings newest_;
+  std::vector<line> lines_; /* [quantities] */
 };
 
 }  // namespace tendonfmu::plant

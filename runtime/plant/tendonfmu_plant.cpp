@@ -9,7 +9,6 @@
 #include "description_error.h"
 #include "motion.h"
 #include "plant.h"
-#include "rig_reader.h"
 
 struct tendonfmu_plant {
   tendonfmu_plant(tendonfmu::plant::rig numbers, std::uint64_t identity) : finger(std::move(numbers), identity) {}
@@ -210,11 +209,11 @@ size_t tendonfmu_plant_order(const tendonfmu_plant* plant) {
 }
 
 tendonfmu_plant_status tendonfmu_plant_derivative(const tendonfmu_plant* plant, double time, const double* state,
-                                                  double* derivative, double* jacobian) {
+                                                  double* derivative) {
   return guarded(plant, [&] {
     need_pointer(state, "state");
     need_pointer(derivative, "derivative");
-    plant->finger.derivative(time, state, derivative, jacobian);
+    plant->finger.derivative(time, state, derivative);
   });
 }
 

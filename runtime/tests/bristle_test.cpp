@@ -6,8 +6,6 @@
 #include <cmath>
 #include <random>
 
-#include "site_law.h"
-
 namespace {
 
 using namespace tendonfmu::plant;

@@ -11,12 +11,16 @@ thread_local long left = -1;  // allocations that succeed before all others fail
 }  // namespace
 
 // not inlined: gcc takes free() beside new for a mistake
-__attribute__((noinline)) void* operator new(std::size_t size) {
+__attribute__((noinline)) void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
   if (left == 0) {
-    throw std::bad_alloc();
+    return nullptr;
   }
   left -= left > 0;
-  if (void* memory = std::malloc(size)) {
+  return std::malloc(size);
+}
+
+__attribute__((noinline)) void* operator new(std::size_t size) {
+  if (void* memory = operator new(size, std::nothrow)) {
     return memory;
   }
   throw std::bad_alloc();

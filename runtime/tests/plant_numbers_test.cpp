@@ -10,9 +10,8 @@
 #include <random>
 #include <vector>
 
-#include "dual.h"
 #include "motion.h"
-#include "random_numbers.h"
+#include "vector3.h"
 
 namespace {
 

@@ -1,5 +1,5 @@
 // Rig files that are refused, in one line with the key path, and those at the ends of what is allowed.
-#include "rig_reader.h"
+#include "rig.h"
 
 #include <gtest/gtest.h>
 

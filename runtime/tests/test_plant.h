@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "rig_reader.h"
+#include "rig.h"
 #include "tendonfmu_plant.h"
 
 namespace test_plant {

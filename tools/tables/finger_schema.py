@@ -13,7 +13,7 @@ NAME: Schema = {"type": "string", "minLength": 1, "maxLength": 200, "pattern": "
 NULL: Schema = {"type": "null"}
 LAW = "F(v) = sgn(v)·(coulomb + (static − coulomb)·exp(−|v|/stribeck_velocity) + viscous·|v|), static >= coulomb"
 
-# What must hold between keys; the reader in runtime/description/shape_reader.cpp has the same in C++.
+# What must hold between keys; the reader in runtime/description/description_reader.cpp has the same in C++.
 _NEEDS_BANDS = {
     "if": {"properties": {"method": {"const": "bands"}}, "required": ["method"]},
     "then": {"required": ["bands"], "properties": {"bands": {"type": "array"}}},

@@ -33,7 +33,7 @@ TEMPLATES = {
     "tendonfmu_outputs.h.jinja": "runtime/include/tendonfmu_outputs.h",
     "tendonfmu_outputs.hpp.jinja": "runtime/include/tendonfmu_outputs.hpp",
     "output_table.h.jinja": "python/binding/output_table.h",
-    "finger_signals.c.jinja": "fmu_src/finger_signals.c",
+    "finger_signals.h.jinja": "fmu_src/finger_signals.h",
     "output_names.py.jinja": "python/tendonfmu/model/output_names.py",
     "description_keys.md.jinja": "docs/reference/description_keys.md",
     "fmu_variables.md.jinja": "docs/reference/fmu_variables.md",

@@ -232,11 +232,4 @@ class Plant:
         """Return the right-hand side of the differential equations."""
         # state: [order]; returns [order]
         with _refusals():
-            slope, _ = self._plant.derivative(time, np.ascontiguousarray(state, dtype=np.float64), False)
-        return slope.reshape(-1)
-
-    def jacobian(self, time: float, state: Array) -> NDArray[np.float64]:
-        """Return the derivative of the right-hand side by the state."""
-        # state: [order]; returns [order, order]
-        with _refusals():
-            return self._plant.derivative(time, np.ascontiguousarray(state, dtype=np.float64), True)[1]
+            return self._plant.derivative(time, np.ascontiguousarray(state, dtype=np.float64)).reshape(-1)
