@@ -11,8 +11,7 @@ from scipy import sparse
 from scipy.signal import lfilter
 
 from tendonfmu.diagnosis.series import Series
-from tendonfmu.statistics.blocks import BlockSeries
-from tendonfmu.statistics.splines import basis, spline_basis, without
+from tendonfmu.statistics.blocks import BlockSeries, basis, spline_basis, without
 
 Numbers = NDArray[np.float64]
 

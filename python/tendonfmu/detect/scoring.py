@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from tendonfmu.arrays import Data, Flags, Numbers
 from tendonfmu.detect.counting import DetectionScore, Signals, pooled, score_detection
-from tendonfmu.detect.reference_sensor import sensed_contact
+from tendonfmu.detect.free_motion import sensed_contact
 from tendonfmu.detect.summary import FACTORS, RocPoint, Summary, roc, summarise
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import check_given_once

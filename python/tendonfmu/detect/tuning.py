@@ -20,9 +20,13 @@ from tendonfmu.arrays import Numbers, rounded
 from tendonfmu.detect.free_motion import Alarms, FreePart, count_alarms, free_parts
 from tendonfmu.detect.learning import (
     ClosedLoop,
+    Terms,
+    bands_of,
     close_the_loop,
     levels_of,
+    motors_of,
     numbers_of,
+    run_free,
     seconds_of,
     weights_of,
 )
@@ -39,7 +43,6 @@ from tendonfmu.detect.noise import (
 )
 from tendonfmu.detect.pushes import push_sizes
 from tendonfmu.detect.sensor_faults import SensorRule, learn_sensors
-from tendonfmu.detect.terms import Terms, bands_of, motors_of, run_free
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import check_given_once
 from tendonfmu.files import are, counted

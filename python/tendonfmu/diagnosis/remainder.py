@@ -4,7 +4,7 @@ Two methods look at it:
 
 - flexible learners without physics on everything that is known of the motion and its past, judged on unseen
   stretches (remainder_learner.py);
-- a search for steady oscillations in time (statistics/spectral_line.py).
+- a search for steady oscillations in time (statistics/whitening.py).
 """
 
 from __future__ import annotations

@@ -2,20 +2,71 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from tendonfmu.arrays import Numbers
-from tendonfmu.estimate.evaluation import Evaluation, residual_entry
+from tendonfmu.arrays import Data, Numbers
+from tendonfmu.estimate.core_runs import CoreRuns, SlowDrift
 from tendonfmu.estimate.files import FIT_REPORT
 from tendonfmu.estimate.learning import Learned, unknown_names
-from tendonfmu.estimate.verdicts import Fitted
+from tendonfmu.estimate.verdicts import CAUSES, Fitted
 from tendonfmu.files import counted, finite
-from tendonfmu.model import Finger, native
-from tendonfmu.recordings import consistency, whiteness
+from tendonfmu.model import Finger, native, without_friction
+from tendonfmu.recordings import FitRecording, Model, consistency, rms, whiteness
 from tendonfmu.statistics import effective_samples
+
+# --- one recording under a finger -------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """A recording under the fitted finger."""
+
+    recording: FitRecording  # prepared recording
+    model: Model  # of the fitted finger, and of that of the start
+    start: Model
+    bias_only: Model  # with the same bias filter and no friction at all
+    model_only: Numbers  # [N, n] y − T less a constant per part (N·m)
+
+
+def evaluate(start: Data, fitted: Data, recording: FitRecording) -> Evaluation:
+    """Judge a fitted finger on a recording."""
+    model = recording.run(fitted)
+    rest = recording.target - model.torque
+    for part in recording.parts:
+        chosen = recording.train[part] if recording.train[part].any() else recording.tracked[part]
+        if chosen.any():
+            rest[part] -= rest[part][chosen].mean(axis=0)
+    return Evaluation(
+        recording=recording,
+        model=model,
+        start=recording.run(start),
+        bias_only=recording.run(without_friction(fitted)),
+        model_only=rest,
+    )
+
+
+def residual_entry(evaluations: Sequence[Evaluation], which: str) -> dict[str, list[float]] | None:
+    """Compute the rms [n] by joint over the samples of a flag ("train" or "held_out"); None without any."""
+    chosen = [np.asarray(getattr(evaluation.recording, which)) for evaluation in evaluations]
+    if not any(flags.any() for flags in chosen):
+        return None
+    flags = np.concatenate(chosen) & ~np.isnan(
+        np.concatenate([evaluation.model.residual for evaluation in evaluations])
+    ).any(axis=1)
+    series = {
+        "rms": [evaluation.model.residual for evaluation in evaluations],
+        "start_rms": [evaluation.start.residual for evaluation in evaluations],
+        "bias_only_rms": [evaluation.bias_only.residual for evaluation in evaluations],
+        "model_only_rms": [evaluation.model_only for evaluation in evaluations],
+        "torque_rms": [evaluation.recording.target for evaluation in evaluations],
+    }
+    return {name: rms(np.concatenate(values), flags) for name, values in series.items()}
+
 
 LEAST_NIS, MOST_NIS, MOST_LAG_ONE = 0.5, 2.0, 0.3  # values outside give a warning
 _MORE_PASSES = ": allow more (--passes), or estimate fewer numbers (--only, --fix, --share)"
@@ -141,4 +192,66 @@ def noise_sentences(innovations: Mapping[str, Any]) -> list[str]:
             f"residuals are not white (autocorrelation {far:.2f} from one sample to the next): the model lacks an "
             f"effect, or the noise is correlated; {count}, treat the standard errors with caution"
         )
+    return sentences
+
+
+# --- the given numbers ------------------------------------------------------------------------------------------------
+
+
+FAR, MOST_NAMED = 2.0, 4  # a factor by which a number moves far, and such numbers named at most
+
+
+def unseen_square(data: Data, recordings: Sequence[FitRecording]) -> float:
+    """Return Σ r² over the samples held out and all joints, (N·m)², without a learning bias; 0 without any."""
+    unseen = [replace(recording, train=recording.held_out) for recording in recordings if recording.held_out.any()]
+    if not unseen:
+        return 0.0
+    runs = CoreRuns(data, unseen)
+    return float(np.sum(SlowDrift(runs.time, runs.stretch, runs.used).without(runs.residual()) ** 2))
+
+
+def is_worse(training: Sequence[Evaluation]) -> bool:
+    """Return whether fitted numbers leave more of the samples held out than the given ones."""
+    held = residual_entry(training, "held_out")
+    return held is not None and float(np.sum(np.square(held["rms"]))) > float(np.sum(np.square(held["start_rms"])))
+
+
+def movement(numbers: Sequence[Fitted], estimated: bool, kept: bool) -> dict[str, Any]:
+    """Return how many numbers moved, which stayed, and why, for the report."""
+    moved = [number for number in numbers if abs(number.value - number.start) > number.standard_error]
+    stayed = [number for number in numbers if abs(number.value - number.start) <= number.standard_error]
+    return {
+        "start": "estimated" if estimated else "guessed",
+        "kept": kept,
+        "moved": len(moved),
+        "stayed": [number.number.path for number in stayed],
+        "paragraph": " ".join([*_sentences(len(moved), stayed, estimated, kept), *_far(moved)]),
+    }
+
+
+def _far(moved: Sequence[Fitted]) -> list[str]:
+    """Name the numbers that moved by more than a factor, the farthest first."""
+    ratios = [
+        (max(number.value / number.start, number.start / number.value), number)
+        for number in moved
+        if number.start > 0.0 and number.value > 0.0 and abs(number.value - number.start) > 3.0 * number.standard_error
+    ]
+    far = sorted((each for each in ratios if each[0] > FAR), key=lambda each: -each[0])
+    if not far:
+        return []
+    named = [f"{each.number.path} {each.start:.3g} → {each.value:.3g}" for _, each in far[:MOST_NAMED]]
+    more = f" and {len(far) - MOST_NAMED} more" if len(far) > MOST_NAMED else ""
+    return [f"Moved by more than a factor of {FAR:g}: {'; '.join(named)}{more}."]
+
+
+def _sentences(moved: int, stayed: Sequence[Fitted], estimated: bool, kept: bool) -> list[str]:
+    if kept:
+        return ["The given numbers are kept: fitted ones leave a larger error on the held-out samples."]
+    sentences = ["The given numbers were estimated before."] if estimated else []
+    sentences.append(f"{counted(moved, 'number')} moved by more than their standard errors")
+    reasons = Counter(number.cause for number in stayed)
+    why = [f"{count}: {CAUSES[cause]}" for cause, count in reasons.most_common() if cause]
+    if reasons[""]:
+        why.append(f"{reasons['']}: the data agree with the given value{'s' * (reasons[''] > 1)}")
+    sentences[-1] += f"; {len(stayed)} stayed ({'; '.join(why)})." if stayed else "."
     return sentences

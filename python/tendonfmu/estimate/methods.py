@@ -21,17 +21,20 @@ from tendonfmu.errors import InputError, NothingLeftError
 from tendonfmu.estimate.core_runs import image_that_holds
 from tendonfmu.estimate.estimation import BatchResult, EstimationError, Estimator, Learner
 from tendonfmu.estimate.learning import (
+    GUESS,
     FitProgress,
     FrictionFitOptions,
     Interrupted,
     Learned,
+    Prior,
     Settings,
     Watch,
+    inverse,
+    most_likely,
     unknown_names,
 )
 from tendonfmu.estimate.memory import has_memory
 from tendonfmu.estimate.memory_methods import learn_with_memory, learned_with_memory_at, stroke_time
-from tendonfmu.estimate.prior import GUESS, Prior, inverse, most_likely
 from tendonfmu.estimate.structure import Structure, with_values
 from tendonfmu.files import counted
 from tendonfmu.recordings import FitRecording

@@ -24,9 +24,7 @@ from tendonfmu.errors import InputError
 from tendonfmu.model import Finger, finger_from_data
 from tendonfmu.recordings.faults import gaps, still_runs
 from tendonfmu.recordings.recording import Recording
-from tendonfmu.recordings.signal_noise import FEWEST, white_noise
-from tendonfmu.recordings.smoothing import zero_phase
-from tendonfmu.recordings.stop_operator import stopped
+from tendonfmu.recordings.signal_noise import FEWEST, stopped, white_noise, zero_phase
 from tendonfmu.statistics import Estimate, noisy_regression
 
 BLOCK = 2.0  # s; longer than residuals of sensors are correlated

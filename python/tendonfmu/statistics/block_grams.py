@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from tendonfmu.arrays import Array, Indices, Numbers
-from tendonfmu.statistics.blocks import Folds
-from tendonfmu.statistics.splines import Span, Splines
+from tendonfmu.statistics.blocks import Folds, Span, Splines
 
 MEMORY = 20.0  # blocks over which noise is correlated, about; so many rows count as one against prior knowledge
 _PIECE = 4096  # rows at a time
