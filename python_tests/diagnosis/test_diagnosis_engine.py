@@ -203,7 +203,7 @@ def test_negative_friction_is_no_cause() -> None:
         {"effect": "load_friction", "joint": 1, "tendon": i, "coulomb": size} for i, size in ((1, 1e-4), (2, -2e-4))
     ]
     terms = [Term(by_name("load_friction"), Place(1, i)) for i in (1, 2)]
-    least = LeastSizes(np.zeros(2), np.zeros(2), 0.005, 0.0)
+    least = LeastSizes(np.zeros(2), np.zeros(2), 0.005)
     assert not least.shows_all("load_friction", terms, finger() | {"extensions": rows})
     assert least.shows_all("load_friction", terms[:1], finger() | {"extensions": rows})
 

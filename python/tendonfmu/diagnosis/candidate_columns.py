@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,16 +53,15 @@ def candidate_columns(
     worth: Worth | None = None,
 ) -> CandidateColumns:
     """Compute the columns of all candidates that a description lacks."""
-    plain = without_sensor_fault(data)
     span = span or span_of(data, samples.recordings)
-    proposals = tuple(_proposed(plain, samples.recordings[0].kinematics, span, candidates, worth))
+    proposals = tuple(_proposed(data, samples.recordings[0].kinematics, span, candidates, worth))
     count = proposals[-1].columns.stop if proposals else 0
     joints, blocks = len(data["joints"]), samples.grid.blocks
     _refuse_too_many(blocks * joints * count * 4 / 1e9, count)
     values = np.zeros((blocks, joints, count), dtype=np.float32)
-    base = samples.left(plain)
+    base = samples.left(data)
     for proposal in proposals:
-        for k, column in enumerate(_columns(proposal.variant, plain, samples, base), start=proposal.columns.start):
+        for k, column in enumerate(_columns(proposal.variant, data, samples, base), start=proposal.columns.start):
             values[:, :, k] = column
     return CandidateColumns(values, proposals)
 
@@ -90,13 +88,8 @@ def _refuse_too_many(size: float, columns: int) -> None:
         )
 
 
-def without_sensor_fault(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the description without what asks for more signals than friction does."""
-    return {**data, "contact": {**data["contact"], "watches_motors": None}, "sensor_fault": None}
-
-
 def _proposed(
-    data: Mapping[str, Any], kinematics: int, span: Span, candidates: Sequence[Candidate], worth: Worth | None
+    data: Data, kinematics: int, span: Span, candidates: Sequence[Candidate], worth: Worth | None
 ) -> Iterator[Proposal]:
     first = 0
     for candidate in candidates:

@@ -1,7 +1,6 @@
 """What the smallest size of an effect is that the sensors can show; smaller effects are not reported as causes.
 
-Play must be several times the noise of the positions. A delay must be more than half a
-sample; forces that are early must be so by more than velocities lag that are computed from positions.
+Play must be several times the noise of the positions. A delay must be more than half a sample.
 """
 
 from __future__ import annotations
@@ -33,7 +32,6 @@ class LeastSizes:
     joint_noise: Numbers  # standard deviation of the noise of the joint positions, rad [n]
     tendon_noise: Numbers  # standard deviation of the noise of the tendon positions, m [m]
     step: float  # time between samples, s
-    lag: float  # of velocities, s
 
     def least(self, effect: str, joint: int | None, tendon: int | None) -> float:
         """Return the least size in the unit of the effect's number; 0 if none is known."""
@@ -56,8 +54,7 @@ class LeastSizes:
         number = {"backlash": "width", "time_delay": "delay"}.get(effect)
         if row is None or number is None:
             return True
-        early = self.lag if effect == "time_delay" and row[number] < 0.0 else 0.0
-        return bool(abs(row[number]) >= self.least(effect, place.joint, place.tendon) + early)
+        return bool(abs(row[number]) >= self.least(effect, place.joint, place.tendon))
 
     def resolved(self, cause: Cause, magnitudes: Sequence[float] | Numbers) -> bool:
         """Return whether a candidate with these magnitudes [d] is large enough."""
@@ -72,9 +69,7 @@ class LeastSizes:
         return all(self.shows(effect, term.place, extended_row(data, effect, term.place)) for term in terms)
 
 
-def least_sizes(
-    data: Mapping[str, Any], recordings: Sequence[FitRecording], step: float, lag: float = 0.0
-) -> LeastSizes:
+def least_sizes(data: Mapping[str, Any], recordings: Sequence[FitRecording], step: float) -> LeastSizes:
     """Measure the sensor noise of recordings; `step` is the time between the samples that are estimated from, s."""
     joints: list[Numbers] = []
     tendons: list[Numbers] = []
@@ -91,7 +86,7 @@ def least_sizes(
             rate = 1.0 / float(np.median(np.diff(recording.time[part])))
             for values, noise in ((angle[part], joints), (reached[part], tendons)):
                 noise.append(noise_of(values, zero_phase(values, NOISE_CUTOFF, rate)))
-    return LeastSizes(np.max(joints, axis=0), np.max(tendons, axis=0), step, lag)
+    return LeastSizes(np.max(joints, axis=0), np.max(tendons, axis=0), step)
 
 
 def noise_of(raw: Numbers, smooth: Numbers) -> Numbers:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tendonfmu.arrays import Flags, Numbers
+from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.base import POSITION, Base, refitted, remembering
 from tendonfmu.diagnosis.calibration import calibration, is_better
 from tendonfmu.diagnosis.cause import Cause, Where, with_error
@@ -201,7 +201,6 @@ class Search:
     causes: tuple[Cause, ...]  # in the order in which they were found
     small: tuple[Cause, ...]  # effects that are certain but not material
     events: tuple[Event, ...]  # contact and stalls
-    out: Flags  # blocks that lie in events [B]
 
 
 def search(base: Base, *, least_gain: float, seed: int, phases: Phases) -> Search:
@@ -225,7 +224,6 @@ def search(base: Base, *, least_gain: float, seed: int, phases: Phases) -> Searc
         causes=tuple(searched.causes),
         small=(*searched.refused, *searched.small()),
         events=events,
-        out=out,
     )
 
 

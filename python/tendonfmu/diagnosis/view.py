@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.arrays import Array, Numbers
-from tendonfmu.diagnosis.candidate_columns import CandidateColumns, candidate_columns, without_sensor_fault
+from tendonfmu.diagnosis.candidate_columns import CandidateColumns, candidate_columns
 from tendonfmu.diagnosis.cause import Cause, Key
 from tendonfmu.diagnosis.confirmation import Confirmation
 from tendonfmu.diagnosis.effects import CANDIDATES, Candidate
@@ -104,8 +104,6 @@ def look(
     `model` has the derivatives by the description's numbers, if it was fitted to the same samples.
     """
     predicted = samples.at_predicted_forces(data) if candidates else samples
-    nominal, scale = (
-        model.columns(samples) if model is not None else number_columns(without_sensor_fault(data), predicted)
-    )
+    nominal, scale = model.columns(samples) if model is not None else number_columns(data, predicted)
     columns = candidate_columns(data, predicted, candidates=candidates, worth=least.worth)
     return View(data, samples, predicted, samples.series(data), nominal, scale, columns, least)

@@ -143,7 +143,6 @@ class Candidate:
     name: str
     title: str  # a few plain words
     explanation: str  # what it is physically, and what to look at on the hand
-    excited_by: str  # motion or load that shows it
     # what its evidence is drawn over: "velocity", "angle", "force", "time", "travel", "acceleration" or "load"
     coordinate: str
     possible_places: Callable[[Data, int], list[Place]]  # (data, kinematics) -> where its law is absent

@@ -59,12 +59,12 @@ def row(least: float = -math.inf, **signs: int) -> Make:
     return make
 
 
-def secant(number: str, *, scaled: bool = True, most: float = math.inf) -> Make:
+def secant(number: str, *, most: float = math.inf) -> Make:
     """Return a row without a useful derivative at zero: its column is a finite difference."""
 
     def make(name: str, data: Data, place: Place, shape: Shape) -> Variant:
         def full(factor: float) -> dict[str, Any]:
-            value = float(shape[number]) * (factor if scaled else 1.0)
+            value = float(shape[number]) * factor
             return apply_edits(data, (), [_row(name, place, {number: min(max(value, -most), most)})], {})
 
         return Variant(data, shape, full=full)
