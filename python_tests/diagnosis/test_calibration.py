@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from made_columns import UNSEEN, Made, candidate_columns, coloured, grams_of, waves
 from tendonfmu.diagnosis.calibration import PLAUSIBLE, calibrated, calibration, is_better
-from tendonfmu.diagnosis.cause import Cause, CausePlace, Where
-from tendonfmu.diagnosis.cause_gains import merged
+from tendonfmu.diagnosis.candidate_columns import hypotheses
 from tendonfmu.diagnosis.effects import BY_NAME, Place, Term
+from tendonfmu.diagnosis.extension_diagnosis import merged
 from tendonfmu.diagnosis.extension_fit import extended_description
-from tendonfmu.diagnosis.hypotheses import hypotheses
+from tendonfmu.diagnosis.result import Cause, CausePlace, Where
 from tendonfmu.diagnosis.samples import as_described, corrected_arms
 from tendonfmu.diagnosis.search import Trial, beside_calibration
 from tendonfmu.diagnosis.selection import Selection

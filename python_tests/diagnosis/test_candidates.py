@@ -18,10 +18,9 @@ from numpy.typing import NDArray
 
 from tendonfmu.diagnosis.candidate_columns import CandidateColumns, Proposal, candidate_columns
 from tendonfmu.diagnosis.effects import CANDIDATES, Place, Variant, by_name
-from tendonfmu.diagnosis.effects.description_edit import add_to_number
+from tendonfmu.diagnosis.effects.candidate import add_to_number
 from tendonfmu.diagnosis.extension_fit import number_columns
-from tendonfmu.diagnosis.samples import Samples
-from tendonfmu.diagnosis.span import Span, span_of
+from tendonfmu.diagnosis.samples import Samples, Span, span_of
 from tendonfmu.estimate import unknowns
 from tendonfmu.estimate.structure import own_copy
 from tendonfmu.model import native

@@ -10,12 +10,20 @@ import pytest
 from numpy.typing import NDArray
 
 from made_columns import BLOCKS, JOINTS, UNSEEN, Made, candidate_columns, coloured, grams_of, waves
-from tendonfmu.diagnosis.candidate_columns import CandidateColumns
-from tendonfmu.diagnosis.cause import EVERYWHERE, HERE, SOMEWHERE, Cause
+from tendonfmu.diagnosis.candidate_columns import LARGEST, LARGEST_SCALING, LARGEST_SECANT, CandidateColumns, hypotheses
 from tendonfmu.diagnosis.effects import Place, by_name
-from tendonfmu.diagnosis.hypotheses import LARGEST, LARGEST_SCALING, LARGEST_SECANT, hypotheses
-from tendonfmu.diagnosis.least_sizes import BEFORE_FIT, OF_NOISE, OF_SAMPLE, LeastSizes, noise_of
-from tendonfmu.diagnosis.selection import CERTAIN, Selection, names_with, rms_gain
+from tendonfmu.diagnosis.result import EVERYWHERE, HERE, SOMEWHERE, Cause
+from tendonfmu.diagnosis.selection import (
+    BEFORE_FIT,
+    CERTAIN,
+    OF_NOISE,
+    OF_SAMPLE,
+    LeastSizes,
+    Selection,
+    names_with,
+    noise_of,
+    rms_gain,
+)
 from tendonfmu.statistics.block_grams import standard_error
 
 Numbers = NDArray[np.float64]

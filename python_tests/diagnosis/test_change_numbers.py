@@ -13,9 +13,9 @@ import pytest
 
 from fit_cases import small_finger
 from random_fingers import random_extended, random_finger
-from tendonfmu.diagnosis.cause import EVERYWHERE, HERE, SOMEWHERE, Cause
-from tendonfmu.diagnosis.effects.description_edit import data_number
-from tendonfmu.diagnosis.hypotheses import Number, estimator_of, number_hypotheses, numbers_of, with_numbers
+from tendonfmu.diagnosis.candidate_columns import Number, estimator_of, number_hypotheses, numbers_of, with_numbers
+from tendonfmu.diagnosis.effects.candidate import data_number
+from tendonfmu.diagnosis.result import EVERYWHERE, HERE, SOMEWHERE, Cause
 from worn_finger import described
 
 Description = dict[str, Any]

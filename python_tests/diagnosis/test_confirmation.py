@@ -10,8 +10,8 @@ from scipy.stats import binom
 from made_columns import BLOCKS, JOINTS, STEP, coloured, series_with, waves
 from repetitions import repeated
 from synthetic_series import bias_splines
-from tendonfmu.diagnosis.confirmation import Confirmation
-from tendonfmu.diagnosis.series import Series
+from tendonfmu.diagnosis.samples import Series
+from tendonfmu.diagnosis.view import Confirmation
 from tendonfmu.statistics.blocks import basis, make_folds, without
 from tendonfmu.statistics.whitening import valid_rows, whitener
 

@@ -19,14 +19,14 @@ from repetitions import repeated
 from tendonfmu.diagnosis import base as base_module
 from tendonfmu.diagnosis import search as search_module
 from tendonfmu.diagnosis.base import delay_of_positions, find_base
-from tendonfmu.diagnosis.cause import Cause, Where, with_error
-from tendonfmu.diagnosis.cause_gains import merged
 from tendonfmu.diagnosis.diagnosis import PHASES
 from tendonfmu.diagnosis.effects import Place, Term, by_name
+from tendonfmu.diagnosis.extension_diagnosis import merged
 from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel
-from tendonfmu.diagnosis.least_sizes import LeastSizes, least_sizes
+from tendonfmu.diagnosis.result import Cause, Where, with_error
 from tendonfmu.diagnosis.samples import Samples, as_described, corrected_arms, predicted_forces
 from tendonfmu.diagnosis.search import ExtensionSearch, Trial, search
+from tendonfmu.diagnosis.selection import LeastSizes, least_sizes
 from tendonfmu.model.description import Finger
 from tendonfmu.model.native import Instance
 from tendonfmu.recordings.prepared import FitRecording, Held, prepare

@@ -13,8 +13,8 @@ from scipy.signal import lfilter
 from synthetic_series import bias_splines
 from tendonfmu.diagnosis.candidate_columns import CandidateColumns, Proposal
 from tendonfmu.diagnosis.effects import Column, Place, Variant, by_name
-from tendonfmu.diagnosis.least_sizes import LeastSizes
-from tendonfmu.diagnosis.series import Series
+from tendonfmu.diagnosis.samples import Series
+from tendonfmu.diagnosis.selection import LeastSizes
 from tendonfmu.statistics.block_grams import Grams, Products
 from tendonfmu.statistics.blocks import make_folds
 

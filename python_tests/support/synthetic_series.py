@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.signal import lfilter
 
-from tendonfmu.diagnosis.series import Series
+from tendonfmu.diagnosis.samples import Series
 from tendonfmu.statistics.blocks import BlockSeries, basis, spline_basis, without
 
 Numbers = NDArray[np.float64]

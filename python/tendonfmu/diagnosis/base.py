@@ -20,9 +20,8 @@ from tendonfmu.arrays import Data, Flags, Numbers
 from tendonfmu.diagnosis.effects import CANDIDATES, Candidate, Place, Term, by_name
 from tendonfmu.diagnosis.effects.memory import memory_of, memory_terms
 from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel, extended_description, fit_numbers
-from tendonfmu.diagnosis.least_sizes import LeastSizes, least_sizes
 from tendonfmu.diagnosis.samples import Samples
-from tendonfmu.diagnosis.selection import Selection
+from tendonfmu.diagnosis.selection import LeastSizes, Selection, least_sizes
 from tendonfmu.diagnosis.view import View, look
 from tendonfmu.estimate import choose_memory
 from tendonfmu.model import EFFECT_NUMBERS, Finger, moment_arms

@@ -14,9 +14,8 @@ import numpy as np
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.candidate_columns import Proposal
-from tendonfmu.diagnosis.cause import EVERYWHERE, Cause, CausePlace, Direction, Sensor, Where, with_error
 from tendonfmu.diagnosis.effects import BY_NAME, CALIBRATED, CALIBRATION, Place, Term
-from tendonfmu.diagnosis.result import ABSORBED
+from tendonfmu.diagnosis.result import ABSORBED, EVERYWHERE, Cause, CausePlace, Direction, Sensor, Where, with_error
 from tendonfmu.diagnosis.selection import CERTAIN, Selection, rms_gain, step_p_value
 from tendonfmu.diagnosis.view import View
 from tendonfmu.model import moment_arms

@@ -16,11 +16,9 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from tendonfmu.arrays import Array, Data, Flags, Numbers
-from tendonfmu.diagnosis.cause import Cause, Key, with_error
+from tendonfmu.diagnosis.candidate_columns import number_hypotheses, numbers_of, with_numbers
 from tendonfmu.diagnosis.effects import Term
 from tendonfmu.diagnosis.extension_fit import extended_description
-from tendonfmu.diagnosis.hypotheses import number_hypotheses, numbers_of, with_numbers
-from tendonfmu.diagnosis.least_sizes import LeastSizes
 from tendonfmu.diagnosis.reference import (
     background_columns,
     find_repeats,
@@ -29,9 +27,17 @@ from tendonfmu.diagnosis.reference import (
     less_reference,
     outside,
 )
-from tendonfmu.diagnosis.samples import Samples
-from tendonfmu.diagnosis.selection import CERTAIN, SIGNIFICANCE, CauseSearch, Selection, is_alike, names_with
-from tendonfmu.diagnosis.series import exact_model
+from tendonfmu.diagnosis.result import Cause, Key, with_error
+from tendonfmu.diagnosis.samples import Samples, exact_model
+from tendonfmu.diagnosis.selection import (
+    CERTAIN,
+    SIGNIFICANCE,
+    CauseSearch,
+    LeastSizes,
+    Selection,
+    is_alike,
+    names_with,
+)
 from tendonfmu.diagnosis.view import look
 from tendonfmu.model import moment_arms
 from tendonfmu.statistics import Grams, Interval, Products

@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.arrays import Array, Data, Numbers
-from tendonfmu.diagnosis.cause import with_error
 from tendonfmu.diagnosis.effects import Term
-from tendonfmu.diagnosis.effects.description_edit import sides_at
+from tendonfmu.diagnosis.effects.candidate import sides_at
 from tendonfmu.diagnosis.effects.memory import PRESLIDING, memory_of, needs_presliding
 from tendonfmu.diagnosis.effects.terms import changed_law
+from tendonfmu.diagnosis.result import with_error
 from tendonfmu.diagnosis.samples import Samples
 from tendonfmu.estimate import (
     Choice,

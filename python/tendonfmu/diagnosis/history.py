@@ -27,12 +27,12 @@ import numpy as np
 from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.answer import Asked
 from tendonfmu.diagnosis.base import find_base
-from tendonfmu.diagnosis.cause import ChangedSize, Where
 from tendonfmu.diagnosis.change_diagnosis import sizes_now
 from tendonfmu.diagnosis.diagnosis import LEAST_GAIN, diagnose
 from tendonfmu.diagnosis.extension_fit import FitSettings
 from tendonfmu.diagnosis.inputs import read_input
 from tendonfmu.diagnosis.kinematic_causes import find_kinematic_causes
+from tendonfmu.diagnosis.result import ChangedSize, Where
 from tendonfmu.errors import InputError
 from tendonfmu.model import Finger, read_finger
 from tendonfmu.statistics import Interval

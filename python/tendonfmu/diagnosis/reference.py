@@ -19,7 +19,7 @@ from scipy.signal import correlate
 from tendonfmu.arrays import Array, Flags, Numbers
 from tendonfmu.diagnosis.candidate_columns import CandidateColumns
 from tendonfmu.diagnosis.remainder_features import Features, features
-from tendonfmu.diagnosis.series import Series
+from tendonfmu.diagnosis.samples import Series
 from tendonfmu.model import moment_arms
 from tendonfmu.statistics import Folds, make_folds
 

@@ -15,12 +15,11 @@ import numpy as np
 from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.base import POSITION, Base, refitted, remembering
 from tendonfmu.diagnosis.calibration import calibration, is_better
-from tendonfmu.diagnosis.cause import Cause, Where, with_error
 from tendonfmu.diagnosis.contact_scan import events_of
 from tendonfmu.diagnosis.effects import CALIBRATED, Place, Term
 from tendonfmu.diagnosis.effects.memory import MEMORY, memory_of
 from tendonfmu.diagnosis.extension_fit import FittedModel, extended_description, fit_extended, possible
-from tendonfmu.diagnosis.result import Event
+from tendonfmu.diagnosis.result import Cause, Event, Where, with_error
 from tendonfmu.diagnosis.selection import (
     CERTAIN,
     SIGNIFICANCE,

@@ -9,14 +9,14 @@ from dataclasses import replace
 import numpy as np
 
 from tendonfmu.arrays import Data
-from tendonfmu.diagnosis.cause import Cause, CausePlace, ChangedSize, Parameters, with_error
+from tendonfmu.diagnosis.candidate_columns import with_numbers
 from tendonfmu.diagnosis.change_search import ChangeSearch
 from tendonfmu.diagnosis.effects import BY_NAME
-from tendonfmu.diagnosis.effects.description_edit import data_number
+from tendonfmu.diagnosis.effects.candidate import data_number
 from tendonfmu.diagnosis.effects.places import thresholds
 from tendonfmu.diagnosis.effects.words import NBSP, quantity
 from tendonfmu.diagnosis.extension_fit import added_paths
-from tendonfmu.diagnosis.hypotheses import with_numbers
+from tendonfmu.diagnosis.result import Cause, CausePlace, ChangedSize, Parameters, with_error
 from tendonfmu.files import counted
 from tendonfmu.model import native
 from tendonfmu.statistics import Interval

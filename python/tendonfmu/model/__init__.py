@@ -66,8 +66,17 @@ if TYPE_CHECKING:
     )
     from .output_names import FLAGS, INPUTS, NUMBERS, OPTIONAL_NUMBERS, PLACE, SENSORS
     from .plausibility import Finding, description_findings, is_direct_drive
-    from .routing_geometry import EDGE_RED, TENDON_COLOURS, BentDrawing, DrawnTendon, FingerDrawing, finger_drawing
-    from .routing_svg import Mark, finger_svg, keys_of
+    from .routing_geometry import (
+        EDGE_RED,
+        TENDON_COLOURS,
+        BentDrawing,
+        DrawnTendon,
+        FingerDrawing,
+        Mark,
+        finger_drawing,
+        finger_svg,
+        keys_of,
+    )
     from .starting_finger import starting_finger
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

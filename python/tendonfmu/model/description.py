@@ -20,7 +20,7 @@ from tendonfmu.errors import InputError
 from tendonfmu.files import counted, path_of, write_text
 from tendonfmu.model import native
 from tendonfmu.model.description_numbers import extension_numbers, extension_rows, with_values_at
-from tendonfmu.model.routing_svg import finger_html
+from tendonfmu.model.routing_geometry import finger_html
 
 IN_MEMORY = Path("finger")  # stands for the file of a finger that was read from none
 FORMAT = "tendonfmu-finger-1"

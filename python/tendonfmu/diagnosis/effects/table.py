@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from tendonfmu.diagnosis.effects import places, shapes, terms, words
+from tendonfmu.diagnosis.effects import places, terms, words
 from tendonfmu.diagnosis.effects.candidate import Candidate
 from tendonfmu.diagnosis.effects.places import lacks_drop, lacks_sides, lacks_viscous, laws_where, nowhere
 from tendonfmu.errors import InputError
@@ -22,7 +22,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         possible_places=laws_where(lacks_viscous),
         make=terms.viscous,
         size=words.of("viscous {}", "viscous"),
-        find_shapes=shapes.laws_that_lack(lacks_viscous),
+        find_shapes=places.laws_that_lack(lacks_viscous),
         shared=True,
     ),
     Candidate(
@@ -37,7 +37,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         possible_places=laws_where(lacks_drop),
         make=terms.stribeck,
         size=words.standstill,
-        find_shapes=shapes.stribeck,
+        find_shapes=places.stribeck,
         shared=True,
     ),
     Candidate(
@@ -51,7 +51,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         possible_places=laws_where(lacks_sides),
         make=terms.sides,
         size=words.sides,
-        find_shapes=shapes.laws_that_lack(lacks_sides),
+        find_shapes=places.laws_that_lack(lacks_sides),
     ),
     Candidate(
         name="edge_friction",
@@ -65,7 +65,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         possible_places=places.absent_edges,
         make=terms.edge,
         size=words.of("up to {} of the tendon force", "coulomb"),
-        find_shapes=shapes.edge,
+        find_shapes=places.edge,
         shared=True,
     ),
     Candidate(
@@ -120,7 +120,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         size=words.with_number(
             words.of("{} of friction", "coulomb"), "beyond", ", {} times as much at the joints beyond"
         ),
-        find_shapes=shapes.sheath,
+        find_shapes=places.sheath,
         shared=True,
     ),
     Candidate(
@@ -249,7 +249,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         # friction does not change its sign
         make=terms.row(-0.85, amplitude=0),
         size=words.drift,
-        find_shapes=shapes.drift,
+        find_shapes=places.drift,
     ),
     Candidate(
         name="force_gain",
@@ -300,7 +300,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         possible_places=places.whole_finger,
         make=terms.delay,
         size=words.delay,
-        find_shapes=shapes.delay,
+        find_shapes=places.delay,
         common=True,
     ),
     Candidate(
@@ -340,7 +340,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         size=words.with_number(
             words.wave("the arm goes up and down by {}"), "turns", ", {} times per turn of the joint"
         ),
-        find_shapes=shapes.pulley,
+        find_shapes=places.pulley,
     ),
     Candidate(
         name="tendon_nonlinearity",
@@ -354,7 +354,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         possible_places=places.stretching_tendons,
         make=terms.secant("hardening"),
         size=words.of("the spring stiffens by {}", "hardening"),
-        find_shapes=shapes.hardening,
+        find_shapes=places.hardening,
     ),
     Candidate(
         name="joint_coupling",
@@ -372,7 +372,7 @@ CANDIDATES: tuple[Candidate, ...] = (
             "reaction",
             ", of which the next joint feels {} times as much",
         ),
-        find_shapes=shapes.either({}, {"reaction": 0.0}),
+        find_shapes=places.either({}, {"reaction": 0.0}),
     ),
     Candidate(
         name="backlash",
@@ -386,7 +386,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         possible_places=places.moving_parts,
         make=terms.secant("width"),
         size=words.of("a play of {}", "width"),
-        find_shapes=shapes.play,
+        find_shapes=places.play,
     ),
 )
 CALIBRATION = "calibration"  # many corrections at once: `calibration.py`

@@ -19,15 +19,13 @@ import numpy as np
 
 from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.candidate_columns import CandidateColumns, Proposal, candidate_columns
-from tendonfmu.diagnosis.cause import Where
 from tendonfmu.diagnosis.effects import Candidate, Term
 from tendonfmu.diagnosis.experiments.menu import Entry, combined, loads, motions, own_tension, recorded_of, tensions
 from tendonfmu.diagnosis.experiments.motion import expected_recording, perform
 from tendonfmu.diagnosis.extension_fit import number_columns
 from tendonfmu.diagnosis.names import Names, at_place, names_in
-from tendonfmu.diagnosis.result import Experiment
-from tendonfmu.diagnosis.samples import Samples
-from tendonfmu.diagnosis.span import Span, span_of
+from tendonfmu.diagnosis.result import Experiment, Where
+from tendonfmu.diagnosis.samples import Samples, Span, span_of
 from tendonfmu.errors import InputError, InternalError
 from tendonfmu.estimate import EstimationError
 from tendonfmu.model import NativeError, moment_arms, number_of
