@@ -16,8 +16,9 @@ import pytest
 import diagnosis_examples as examples
 from real_browser import Elements, figures_of, measure, needs_nothing_else
 from repetitions import repeated
+from tendonfmu.diagnosis.effects import Where
 from tendonfmu.diagnosis.names import reported_causes, title_of
-from tendonfmu.diagnosis.result import Diagnosis, RemainderMap, Where
+from tendonfmu.diagnosis.result import Diagnosis, RemainderMap
 from tendonfmu.estimate.picture import FitPicture
 from tendonfmu.report.diagnosis_page import diagnosis_page, waterfall_of
 from tendonfmu.report.diagnosis_text import names_of

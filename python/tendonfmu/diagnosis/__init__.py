@@ -17,6 +17,7 @@ from tendonfmu.lazy_exports import lazy_exports
 if TYPE_CHECKING:
     from .contact_scan import events_of, without_events
     from .diagnosis import diagnose
+    from .effects.candidate import Where
     from .effects.places import thresholds
     from .effects.words import NBSP, quantity
     from .experiments.motion import discriminating_motion
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
         Invisible,
         ResidualView,
         Sensor,
-        Where,
     )
     from .samples import Samples
     from .sizes import size_at

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from scipy.signal import welch
 
 from tendonfmu.arrays import Flags, Numbers
-from tendonfmu.diagnosis.effects import BY_NAME, Place
+from tendonfmu.diagnosis.effects import BY_NAME, Place, Where
 from tendonfmu.diagnosis.extension_fit import FitSettings
 from tendonfmu.diagnosis.gain import Gain
 from tendonfmu.diagnosis.inputs import Input
-from tendonfmu.diagnosis.result import Cause, CausePlace, Diagnosis, Evidence, Key, ResidualView, Unexplained
+from tendonfmu.diagnosis.result import Cause, CausePlace, Diagnosis, Evidence, ResidualView, Unexplained
 from tendonfmu.diagnosis.samples import Series
 from tendonfmu.diagnosis.selection import SIGNIFICANCE
 from tendonfmu.statistics import Interval, make_folds
@@ -318,7 +318,7 @@ def reported(cause: Cause, compared: Compared) -> Cause:
     )
 
 
-def not_taken(causes: Iterable[Cause], experiments: Mapping[Key, str], seconds: float) -> dict[str, Any]:
+def not_taken(causes: Iterable[Cause], experiments: Mapping[Where, str], seconds: float) -> dict[str, Any]:
     """Divide causes that are significant but were not taken into those that are too small and the uncertain ones."""
     # `experiments` names those planned; `seconds` of unseen motion were judged
     small, uncertain = list[Cause](), list[Cause]()
@@ -327,7 +327,7 @@ def not_taken(causes: Iterable[Cause], experiments: Mapping[Key, str], seconds: 
         if cause.gain.low > 0.0 or cause.p_value >= SIGNIFICANCE:
             small.append(cause)
         else:
-            settling = _longer(cause.gain, seconds) or experiments.get(cause.key) or OTHER_MOTION
+            settling = _longer(cause.gain, seconds) or experiments.get(cause.where) or OTHER_MOTION
             uncertain.append(replace(cause, experiment=settling))
     return {"too_small": tuple(small), "uncertain": tuple(uncertain)}
 
@@ -345,4 +345,4 @@ def _places(cause: Cause) -> tuple[CausePlace, ...]:
     """Return the places of the terms of a cause, without numbers; a change is free at all of its places together."""
     if cause.changed is not None or not cause.terms:
         return (CausePlace(cause.joint, cause.tendon, {}),)
-    return tuple(CausePlace(term.place.joint, term.place.tendon, {}) for term in cause.terms)
+    return tuple(CausePlace(*term.place, {}) for term in cause.terms)

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.arrays import Data, Flags, Numbers
-from tendonfmu.diagnosis.effects import CANDIDATES, Candidate, Place, Term, by_name
+from tendonfmu.diagnosis.effects import CANDIDATES, Candidate, Place, Term, Where, by_name
 from tendonfmu.diagnosis.effects.memory import memory_of, memory_terms
 from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel, extended_description, fit_numbers
 from tendonfmu.diagnosis.samples import Samples
@@ -132,7 +132,7 @@ def _position_dependent(data: Data, samples: Samples, least: LeastSizes, least_g
     view = look(data, samples, least, [by_name(name) for name in POSITION])
     taken: list[Any] = []
     while len(taken) < len(POSITION):
-        selection: Selection = view.beside({cause.key for cause in taken})
+        selection: Selection = view.beside({cause.where for cause in taken})
         best = selection.best(least_gain)
         if best is None:
             break
@@ -183,7 +183,7 @@ def _delay_of_positions(data: Data, samples: Samples, least: LeastSizes) -> tupl
     known = delay_of_positions(data, samples.recordings)
     if known is None or not DELAY.places(data, samples.recordings[0].kinematics):
         return None
-    return _late(known) if abs(known) >= least.least("time_delay", None, None) else ()
+    return _late(known) if abs(known) >= least.least(Where("time_delay")) else ()
 
 
 def _late(delay: float) -> tuple[Term, ...]:

@@ -14,8 +14,8 @@ import numpy as np
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.candidate_columns import Proposal
-from tendonfmu.diagnosis.effects import BY_NAME, CALIBRATED, CALIBRATION, Place, Term
-from tendonfmu.diagnosis.result import ABSORBED, EVERYWHERE, Cause, CausePlace, Direction, Sensor, Where, with_error
+from tendonfmu.diagnosis.effects import BY_NAME, CALIBRATED, CALIBRATION, Place, Term, Where
+from tendonfmu.diagnosis.result import ABSORBED, EVERYWHERE, Cause, CausePlace, Direction, Sensor, with_error
 from tendonfmu.diagnosis.selection import CERTAIN, Selection, rms_gain, step_p_value
 from tendonfmu.diagnosis.view import View
 from tendonfmu.model import moment_arms
@@ -71,7 +71,7 @@ def is_better(together: Cause, single: Cause | None, least_gain: float) -> bool:
 def _parts(view: View, tried: Collection[str]) -> list[_Part]:
     """Return the corrections that the description lacks and that refitting leaves visible."""
     arms, count = moment_arms(view.data), view.columns.values.shape[2]
-    parts: dict[tuple[str, int | None, int | None], _Part] = {}
+    parts: dict[Where, _Part] = {}
     for proposal in view.columns.proposals:
         name, place = proposal.candidate.name, proposal.place
         if name not in CALIBRATED or name in tried:
@@ -85,7 +85,7 @@ def _parts(view: View, tried: Collection[str]) -> list[_Part]:
         mix = np.zeros((count, 1))
         mix[proposal.columns] = 1.0
         if usual > 0.0 and unit > 0.0 and view.grams.surviving(mix) >= ABSORBED:
-            parts.setdefault((name, place.joint, place.tendon), _Part(proposal, usual, unit))
+            parts.setdefault(Where(name, *place), _Part(proposal, usual, unit))
     return list(parts.values())
 
 
@@ -107,7 +107,7 @@ def _estimated(view: View, selection: Selection, parts: Sequence[_Part]) -> Caus
 def _late_enough(view: View, cause: Cause, parts: Sequence[_Part]) -> bool:
     """Return whether the sensors can show the delay."""
     return all(
-        abs(part.unit * magnitude) >= view.least.least("time_delay", None, None)
+        abs(part.unit * magnitude) >= view.least.least(Where("time_delay"))
         for part, magnitude in zip(parts, cause.magnitudes.tolist(), strict=True)
         if part.proposal.candidate.name == "time_delay"
     )
@@ -133,12 +133,12 @@ def _sensors(view: View, cause: Cause, parts: Sequence[_Part]) -> tuple[Sensor, 
         unit = {"force_gain": "1", "force_offset": "N", "moment_arm": "m", "time_delay": "s"}[name]
         alone = np.zeros(len(parts))
         alone[k] = parts[k].unit
-        rows.append((Where(name, place.joint, place.tendon), unit, alone))
+        rows.append((Where(name, *place), unit, alone))
         gain = index.get(("force_gain", Place(tendon=place.tendon)))
         if name == "moment_arm" and gain is not None and place.joint is not None and place.tendon is not None:
             both = alone / float(arms[place.tendon - 1, place.joint - 1])
             both[gain] = 1.0
-            rows.append((Where(CALIBRATION, place.joint, place.tendon), "1", both))
+            rows.append((Where(CALIBRATION, *place), "1", both))
     return tuple(
         Sensor(where, with_error(float(mix @ cause.magnitudes), float(np.sqrt(mix @ cause.covariance @ mix))), unit)
         for where, unit, mix in rows
@@ -152,7 +152,7 @@ def calibrated(cause: Cause) -> Cause:
     for term, place in zip(cause.terms, cause.places, strict=True):
         merged.setdefault((place.joint, place.tendon), {}).update(place.parameters)
         ((value, unit),) = place.parameters.values()
-        where = Where(term.candidate.name, place.joint, place.tendon)
+        where = term.where
         before = known.get(where, Sensor(where, Interval(value), unit)).correction
         moved = value - before.value  # a delay was fitted again
         known[where] = Sensor(where, Interval(value, before.low + moved, before.high + moved), unit)

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.arrays import Data, Numbers
-from tendonfmu.diagnosis.effects import BY_NAME, CANDIDATES, SHARED, Candidate, Place, Term, Variant
+from tendonfmu.diagnosis.effects import BY_NAME, CANDIDATES, SHARED, Candidate, Place, Term, Variant, Where
 from tendonfmu.diagnosis.extension_fit import structure_of
-from tendonfmu.diagnosis.result import EVERYWHERE, HERE, SOMEWHERE, Cause, Direction, Where
+from tendonfmu.diagnosis.result import EVERYWHERE, HERE, SOMEWHERE, Cause, Direction
 from tendonfmu.diagnosis.samples import Samples, Span, span_of, with_late_forces
 from tendonfmu.errors import TooLargeError
 from tendonfmu.estimate import SCALING, Estimator, Unknown, own_copy, set_number
@@ -145,16 +145,16 @@ def _groups(effect: str, places: Sequence[Place]) -> Iterator[tuple[Where, int, 
     """Yield all places, and the places of each joint and tendon if these are several but not all."""
     if len(places) < 2:
         return
-    groups: dict[tuple[int | None, int | None], list[Place]] = {(None, None): list(places)}
+    groups = {Place(): list(places)}
     for place in places:
         if place.joint is not None:
-            groups.setdefault((place.joint, None), []).append(place)
+            groups.setdefault(Place(place.joint), []).append(place)
         if place.tendon is not None:
-            groups.setdefault((None, place.tendon), []).append(place)
-    for (joint, tendon), members in groups.items():
-        whole = (joint, tendon) == (None, None)
+            groups.setdefault(Place(tendon=place.tendon), []).append(place)
+    for group, members in groups.items():
+        whole = group == Place()
         if len(members) >= 2 and (whole or len(members) < len(places)):
-            yield Where(effect, joint, tendon), EVERYWHERE if whole else SOMEWHERE, members
+            yield Where(effect, *group), EVERYWHERE if whole else SOMEWHERE, members
 
 
 # --- effects that the description lacks -------------------------------------------------------------------------------
@@ -176,7 +176,7 @@ def _single(proposal: Proposal, count: int, arms: Numbers, reach: Numbers) -> Ca
     least = LEAST_OF_FAST if variant.shape.get("turns", 1.0) != 1.0 else 0.0
     direction = Direction(mix, low, high, level, np.array(variant.expected), _step(variant), least)
     term = Term(proposal.candidate, place, variant.shape, (1.0,) * variant.count)
-    return _cause(Where(name, place.joint, place.tendon), direction, (term,))
+    return _cause(Where(name, *place), direction, (term,))
 
 
 def _cause(where: Where, direction: Direction, terms: tuple[Term, ...]) -> Cause:
@@ -283,11 +283,11 @@ def number_hypotheses(numbers: Sequence[Number], count: int, first: int) -> list
         by_place.setdefault((number.effect, number.place), []).append(number)
     listed = []
     for (effect, place), members in by_place.items():
-        where, level = Where(effect, place.joint, place.tendon), EVERYWHERE if place == Place() else HERE
+        where, level = Where(effect, *place), EVERYWHERE if place == Place() else HERE
         if any(member.side for member in members):
             listed.append(_changed(where, level, *_scaled(members), members, count, first))
             if effect != "stribeck":
-                apart = Where("asymmetric_friction", place.joint, place.tendon)
+                apart = Where("asymmetric_friction", *place)
                 listed.append(_changed(apart, level, *_apart(members), members, count, first))
         else:
             listed.append(_changed(where, level, *_free(members), members, count, first))

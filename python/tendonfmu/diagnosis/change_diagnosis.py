@@ -18,6 +18,7 @@ from tendonfmu.diagnosis.answer import Asked, Compared, answered, not_taken, rep
 from tendonfmu.diagnosis.base import Base
 from tendonfmu.diagnosis.change_search import ChangeSearch, interval_of
 from tendonfmu.diagnosis.contact_scan import event_gain, events_of, unusual, without_events
+from tendonfmu.diagnosis.effects import Where
 from tendonfmu.diagnosis.extension_fit import with_known
 from tendonfmu.diagnosis.gain import Gain, measure_gain
 from tendonfmu.diagnosis.names import names_in
@@ -27,7 +28,6 @@ from tendonfmu.diagnosis.result import (
     Diagnosis,
     Event,
     Experiment,
-    Key,
     SteadyLoad,
     Unexplained,
     with_error,
@@ -127,7 +127,7 @@ def diagnose_change(asked: Asked, base: Base) -> Diagnosis:
     return _Changes(asked, base).diagnosis()
 
 
-def sizes_now(asked: Asked, base: Base, keys: Sequence[Key]) -> list[tuple[Key, ChangedSize]]:
+def sizes_now(asked: Asked, base: Base, keys: Sequence[Where]) -> list[tuple[Where, ChangedSize]]:
     """Return how large these effects are in the new recordings, named or not."""
     return _Changes(asked, base).sizes(keys)
 
@@ -157,13 +157,13 @@ class _Changes:
             dropped = self._verified()
             return self._result(dropped)
 
-    def sizes(self, keys: Sequence[Key]) -> list[tuple[Key, ChangedSize]]:
+    def sizes(self, keys: Sequence[Where]) -> list[tuple[Where, ChangedSize]]:
         """Return the sizes of effects at places in the new recordings, all of them free."""
         search = self._search = self._searching(self._without_events())
         search.free(keys)
         changes = [search.certain(k) for k in range(len(search.causes))]
         listed = [sized(search, changes, k) for k in range(len(changes))]
-        return [(change.key, change.changed) for change in listed if change.changed is not None]
+        return [(change.where, change.changed) for change in listed if change.changed is not None]
 
     def _without_events(self) -> Samples:
         """Return the samples without contact and stalls."""

@@ -14,14 +14,14 @@ from tendonfmu.diagnosis.answer import Asked, Compared, answered, not_taken, rep
 from tendonfmu.diagnosis.base import Base, refitted
 from tendonfmu.diagnosis.calibration import calibrated
 from tendonfmu.diagnosis.contact_scan import detection_gain, event_gain, events_of, without_events
-from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION, COMMON, OF_LAW, Term
+from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION, COMMON, OF_LAW, Term, Where
 from tendonfmu.diagnosis.effects.memory import PRESLIDING
 from tendonfmu.diagnosis.effects.places import law_of, thresholds
 from tendonfmu.diagnosis.experiments.next_experiment import Experiments, Question, plan_experiments
 from tendonfmu.diagnosis.extension_fit import FittedModel, cause_parameters, fit_extended, intervals_of, with_known
 from tendonfmu.diagnosis.gain import Gain, Unseen, measure_gain
 from tendonfmu.diagnosis.remainder import measure_remainder, remainder_map, unexplained_of
-from tendonfmu.diagnosis.result import Cause, CausePlace, Diagnosis, Event, Invisible, Key, Unexplained, Where
+from tendonfmu.diagnosis.result import Cause, CausePlace, Diagnosis, Event, Invisible, Unexplained
 from tendonfmu.diagnosis.samples import Samples, Span, as_described, span_of
 from tendonfmu.diagnosis.search import Search, search, terms_of
 from tendonfmu.diagnosis.selection import SIGNIFICANCE, by_gain, confirmed, invisible_effects, names_with, step_p_value
@@ -197,9 +197,7 @@ class _Bench:
             replace(
                 cause,
                 intervals=intervals,
-                places=tuple(
-                    CausePlace(term.place.joint, term.place.tendon, numbers[id(term)]) for term in cause.terms
-                ),
+                places=tuple(CausePlace(*term.place, numbers[id(term)]) for term in cause.terms),
             )
             for cause in causes
         ]
@@ -260,7 +258,7 @@ class _Result:
             detection=detection_gain(verified.nominal_data, verified.extended_data, everything) if named else None,
             nominal_data=verified.nominal_data,
             extended_data=verified.extended_data,
-            tested=len({cause.key for cause in searched.last.selection.causes}),
+            tested=len({cause.where for cause in searched.last.selection.causes}),
             event_gain=event_gain(verified.extended_data, given.whole, searched.events),
         )
 
@@ -320,7 +318,7 @@ class _Result:
         shown = remainder_map(*parts) if result.unknown else None
         return replace(result, map=shown)
 
-    def _experiments(self, verified: Verified) -> tuple[Experiments, dict[Key, str], tuple[Invisible, ...]]:
+    def _experiments(self, verified: Verified) -> tuple[Experiments, dict[Where, str], tuple[Invisible, ...]]:
         """Plan experiments for causes that cannot be distinguished or are uncertain, and for effects not visible."""
         rivals = [
             Question(cause.terms[0], rival)
@@ -355,7 +353,7 @@ class _Result:
             if number is not None:
                 hidden = replace(hidden, experiment=planned.sentence(number), motion=planned.motion(number))
             shown.append(hidden)
-        settling = {cause.key: planned.sentence(first + k) for k, cause in enumerate(dropped)}
+        settling = {cause.where: planned.sentence(first + k) for k, cause in enumerate(dropped)}
         return planned, settling, tuple(shown)
 
     @cached_property

@@ -18,11 +18,12 @@ import numpy as np
 from scipy.special import ndtr
 
 from tendonfmu.arrays import Data, Numbers
+from tendonfmu.diagnosis.effects import Where
 from tendonfmu.diagnosis.effects.candidate import add_to_number, data_number
 from tendonfmu.diagnosis.effects.words import NBSP, quantity
 from tendonfmu.diagnosis.inputs import Input
 from tendonfmu.diagnosis.names import ENCODER, ZERO, title_of
-from tendonfmu.diagnosis.result import Cause, CausePlace, ChangedSize, Diagnosis, Key, Where
+from tendonfmu.diagnosis.result import Cause, CausePlace, ChangedSize, Diagnosis
 from tendonfmu.diagnosis.selection import SIGNIFICANCE, by_gain
 from tendonfmu.diagnosis.tendon_equation import (
     ARM,
@@ -105,7 +106,7 @@ class KinematicCauses:
     """What is off, and what it is worth."""
 
     is_change: bool
-    known: dict[Key, Off] = field(default_factory=dict)  # every number that the recordings show
+    known: dict[Where, Off] = field(default_factory=dict)  # every number that the recordings show
     off: tuple[Off, ...] = ()  # those that are causes
     causes: tuple[Cause, ...] = ()
     too_small: tuple[Cause, ...] = ()
@@ -227,8 +228,7 @@ def find_kinematic_causes(given: Input, least_gain: float, seed: int) -> Kinemat
     off = [each for each in known.values() if _is_certain(each, len(known)) and (each.where.effect != ZERO)]
     off += [each for each in known.values() if each.where in single and _is_certain(each, len(known))]
     off += [each for each in offsets if _is_certain(each, len(known))]
-    keys = {(where.effect, where.joint, where.tendon): each for where, each in known.items()}
-    keys |= {(ENCODER, j, None): each for j, each in _by_joint(given.finger.data, known)}
+    keys = known | {Where(ENCODER, j): each for j, each in _by_joint(given.finger.data, known)}
     warnings = () if reference else tuple(varying_sentences(given.finger, learned))
     found = replace(none, known=keys, warnings=warnings)
     if not is_long:

@@ -9,9 +9,10 @@ import numpy as np
 
 from tendonfmu.arrays import Data
 from tendonfmu.diagnosis.contact_scan import LEVEL as SCAN_LEVEL
+from tendonfmu.diagnosis.effects import Where
 from tendonfmu.diagnosis.effects.table import BY_NAME
 from tendonfmu.diagnosis.effects.words import quantity
-from tendonfmu.diagnosis.result import Cause, Diagnosis, Where
+from tendonfmu.diagnosis.result import Cause, Diagnosis
 from tendonfmu.files import counted
 
 CONTACT, UNKNOWN = "contact", "unknown"

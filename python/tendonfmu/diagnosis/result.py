@@ -10,33 +10,24 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.arrays import Numbers
-from tendonfmu.diagnosis.effects import Term
+from tendonfmu.diagnosis.effects import Term, Where
 from tendonfmu.diagnosis.effects.words import off_by
 from tendonfmu.statistics import Interval
 
 # --- causes -----------------------------------------------------------------------------------------------------------
-# 1. A candidate has a place, its terms in a description and its direction in the candidate columns (`candidate_columns`).
+# 1. A candidate has a place, its terms in a description and its direction in the columns (`candidate_columns`).
 # 2. Judged, it has magnitudes and its error on unseen stretches (`selection`).
 # 3. Named, it has a p-value, a gain, and the causes that the data cannot distinguish from it (`search`,
 #    `change_search`).
-# 4. Confirmed, its gain is that on unseen data, and every place has its numbers (`extension_diagnosis`, `change_diagnosis`).
+# 4. Confirmed, its gain is that on unseen data, and every place has its numbers (`extension_diagnosis`,
+#    `change_diagnosis`).
 # 5. Reported, it has its size in words and its pictures (`answer`).
 
 
-Key = tuple[str, int | None, int | None]  # effect, joint, tendon
 Parameters = Mapping[str, tuple[float, str]]  # path of a number in the description -> (value, unit)
 
 EVERYWHERE, SOMEWHERE, HERE = 0, 1, 2  # levels: all places, those of one joint or tendon, a single one
 NO_GAIN = Interval(0.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True)
-class Where:
-    """An effect at a place."""
-
-    effect: str  # name of the effect
-    joint: int | None = None  # number from 1; None if the place has none
-    tendon: int | None = None
 
 
 @dataclass(frozen=True)
@@ -92,7 +83,7 @@ class Sensor:
     @property
     def words(self) -> tuple[str, str]:
         """Which sensor it is, and by how much it is off."""
-        return off_by(self.where.effect, self.where.joint, self.where.tendon, self.correction, self.unit)
+        return off_by(self.where.effect, *self.where.place, self.correction, self.unit)
 
 
 @dataclass(frozen=True)
@@ -190,10 +181,6 @@ class Cause:
     def tendon(self) -> int | None:
         """Number of the tendon from 1; None everywhere or at several places."""
         return self.where.tendon
-
-    @property
-    def key(self) -> Key:
-        return self.effect, self.joint, self.tendon
 
     def scaled(self) -> tuple[Term, ...]:
         """Return the terms of a candidate at its magnitudes."""

@@ -16,10 +16,10 @@ from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.base import POSITION, Base, refitted, remembering
 from tendonfmu.diagnosis.calibration import calibration, is_better
 from tendonfmu.diagnosis.contact_scan import events_of
-from tendonfmu.diagnosis.effects import CALIBRATED, Place, Term
+from tendonfmu.diagnosis.effects import CALIBRATED, Place, Term, Where
 from tendonfmu.diagnosis.effects.memory import MEMORY, memory_of
 from tendonfmu.diagnosis.extension_fit import FittedModel, extended_description, fit_extended, possible
-from tendonfmu.diagnosis.result import Cause, Event, Where, with_error
+from tendonfmu.diagnosis.result import Cause, Event, with_error
 from tendonfmu.diagnosis.selection import (
     CERTAIN,
     SIGNIFICANCE,
@@ -65,7 +65,7 @@ class ExtensionSearch(CauseSearch):
     def _try_next(self, tried: set[str]) -> tuple[Cause, bool] | None:
         # Refused effects explain something, so no other effect is credited with that. A correction of the torque
         # itself is excluded: it resembles whatever else is missing.
-        selection = self.view.beside({refused.key for refused in self.refused if refused.effect not in SCALING})
+        selection = self.view.beside({refused.where for refused in self.refused if refused.effect not in SCALING})
         best = selection.best(self._least_gain, tried)
         together = calibration(self.view, selection, tried, self._least_gain)
         if together is not None and is_better(together, best, self._least_gain):
@@ -182,8 +182,7 @@ def terms_of(causes: Sequence[Cause]) -> list[Term]:
 def _of_start(terms: tuple[Term, ...]) -> Cause:
     """Return a cause of the base, at one place or several."""
     candidate, place = terms[0].candidate, terms[0].place if len(terms) == 1 else Place()
-    where = Where(candidate.name, place.joint, place.tendon)
-    return Cause(where, candidate.title, candidate.explanation, terms=terms)
+    return Cause(Where(candidate.name, *place), candidate.title, candidate.explanation, terms=terms)
 
 
 # --- from recordings to causes ---------------------------------------------------------------------------------------

@@ -18,8 +18,8 @@ from scipy.stats import ttest_1samp
 
 from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.candidate_columns import LARGEST_SECANT
-from tendonfmu.diagnosis.effects import COMMON, Candidate, Place, Term
-from tendonfmu.diagnosis.result import ABSORBED, HERE, Cause, Direction, Invisible, Key, with_error
+from tendonfmu.diagnosis.effects import COMMON, Candidate, Place, Term, Where
+from tendonfmu.diagnosis.result import ABSORBED, HERE, Cause, Direction, Invisible, with_error
 from tendonfmu.model import extended_row, moment_arms
 from tendonfmu.recordings import FitRecording, zero_phase
 from tendonfmu.statistics import Grams, standard_error
@@ -44,20 +44,20 @@ class LeastSizes:
     tendon_noise: Numbers  # standard deviation of the noise of the tendon positions, m [m]
     step: float  # time between samples, s
 
-    def least(self, effect: str, joint: int | None, tendon: int | None) -> float:
+    def least(self, where: Where) -> float:
         """Return the least size in the unit of the effect's number; 0 if none is known."""
-        if effect == "time_delay":
+        if where.effect == "time_delay":
             return OF_SAMPLE * self.step
-        if effect == "backlash":
-            if joint is not None:
-                return OF_NOISE * float(self.joint_noise[joint - 1])
-            if tendon is not None:
-                return OF_NOISE * float(self.tendon_noise[tendon - 1])
+        if where.effect == "backlash":
+            if where.joint is not None:
+                return OF_NOISE * float(self.joint_noise[where.joint - 1])
+            if where.tendon is not None:
+                return OF_NOISE * float(self.tendon_noise[where.tendon - 1])
         return 0.0
 
     def worth(self, candidate: Candidate, place: Place, shape: Mapping[str, float]) -> bool:
         """Return whether a step of this size can lead to a size that the sensors resolve."""
-        least = self.least(candidate.name, place.joint, place.tendon)
+        least = self.least(Where(candidate.name, *place))
         return least == 0.0 or LARGEST_SECANT * abs(float(next(iter(shape.values())))) >= least
 
     def shows(self, effect: str, place: Place, row: Mapping[str, Any] | None) -> bool:
@@ -65,11 +65,11 @@ class LeastSizes:
         number = {"backlash": "width", "time_delay": "delay"}.get(effect)
         if row is None or number is None:
             return True
-        return bool(abs(row[number]) >= self.least(effect, place.joint, place.tendon))
+        return bool(abs(row[number]) >= self.least(Where(effect, *place)))
 
     def resolved(self, cause: Cause, magnitudes: Sequence[float] | Numbers) -> bool:
         """Return whether a candidate with these magnitudes [d] is large enough."""
-        least = self.least(*cause.key)
+        least = self.least(cause.where)
         return least == 0.0 or abs(float(magnitudes[0])) * cause.direction.step >= BEFORE_FIT * least
 
     def shows_all(self, effect: str, terms: Sequence[Term], data: Data) -> bool:
@@ -265,11 +265,11 @@ class Selection:
         """Return the same effect at other places of the same level that are nearly as good, the best first."""
         least = float(best.unseen.sum())
         most = least + NEAR * (float(self.base.sum()) - least)
-        near: dict[Key, int] = {}
+        near: dict[Where, int] = {}
         for k, (error, cause, _, _) in enumerate(self._results):
             same = (cause.effect, cause.direction.level) == (best.effect, best.direction.level)
-            if same and cause.key != best.key and error <= most:
-                near.setdefault(cause.key, k)
+            if same and cause.where != best.where and error <= most:
+                near.setdefault(cause.where, k)
         return [self._judged(k) for k in near.values()]
 
 
@@ -318,27 +318,27 @@ def invisible_effects(
     selection: Selection, causes: Sequence[Cause], known: Sequence[Cause], least_gain: float
 ) -> list[tuple[Cause, Invisible]]:
     """Return, for each place at which an effect of ordinary size would not become a cause, its best shape."""
-    places = {(term.candidate.name, term.place.joint, term.place.tendon) for cause in known for term in cause.terms}
+    places = {term.where for cause in known for term in cause.terms}
     names = [cause.effect for cause in causes]
-    best: dict[Key, tuple[float, Cause, Invisible]] = {}
+    best: dict[Where, tuple[float, Cause, Invisible]] = {}
     for cause, share in zip(selection.causes, selection.shares, strict=True):
-        if cause.direction.level != HERE or cause.key in places:
+        if cause.direction.level != HERE or cause.where in places:
             continue
         gain = selection.grams.ordinary_gain(cause.direction.mix, cause.direction.ordinary)
         needed = least_gain * names_with(cause.effect, names)
         nearness = min(share / ABSORBED, gain / max(needed, SMALLEST_GAIN))  # from 1 on it is visible
-        if cause.key not in best or nearness > best[cause.key][0]:
+        if cause.where not in best or nearness > best[cause.where][0]:
             hidden = Invisible(cause.where, cause.title, share, "", ordinary_gain=gain, needed_gain=needed)
-            best[cause.key] = (nearness, cause, hidden)
+            best[cause.where] = (nearness, cause, hidden)
     ranked = sorted(best.values(), key=lambda entry: -entry[0])
     return [(cause, hidden) for nearness, cause, hidden in ranked if nearness < 1.0]
 
 
 def absorbed_effects(selection: Selection, experiment: str) -> list[Invisible]:
     """Return, for each effect and place that refitting and background absorb, the shape that comes nearest."""
-    best: dict[Key, Invisible] = {}
+    best: dict[Where, Invisible] = {}
     for cause, share in zip(selection.causes, selection.shares, strict=True):
-        if cause.direction.level == HERE and (cause.key not in best or share > best[cause.key].surviving_share):
-            best[cause.key] = Invisible(cause.where, cause.title, share, experiment)
+        if cause.direction.level == HERE and (cause.where not in best or share > best[cause.where].surviving_share):
+            best[cause.where] = Invisible(cause.where, cause.title, share, experiment)
     ranked = sorted(best.values(), key=lambda hidden: -hidden.surviving_share)
     return [hidden for hidden in ranked if hidden.absorbed]

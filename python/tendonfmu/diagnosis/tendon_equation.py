@@ -10,9 +10,10 @@ from itertools import combinations
 import numpy as np
 
 from tendonfmu.arrays import Data, Flags, Indices, Numbers
+from tendonfmu.diagnosis.effects import Where
 from tendonfmu.diagnosis.inputs import Input
 from tendonfmu.diagnosis.names import ENCODER, ZERO
-from tendonfmu.diagnosis.result import ChangedSize, Where
+from tendonfmu.diagnosis.result import ChangedSize
 from tendonfmu.model import moment_arms
 from tendonfmu.recordings import Learned, Recording, TendonRouting, curves, held_on_the_way, smooth_speeds
 from tendonfmu.statistics import Interval, blocks_of, gain_interval, variance_between

@@ -13,9 +13,9 @@ from scipy.special import fdtrc
 
 from tendonfmu.arrays import Array, Indices, Numbers
 from tendonfmu.diagnosis.candidate_columns import CandidateColumns, candidate_columns, hypotheses
-from tendonfmu.diagnosis.effects import CANDIDATES, Candidate
+from tendonfmu.diagnosis.effects import CANDIDATES, Candidate, Where
 from tendonfmu.diagnosis.extension_fit import FittedModel, number_columns
-from tendonfmu.diagnosis.result import Cause, Key
+from tendonfmu.diagnosis.result import Cause
 from tendonfmu.diagnosis.samples import Samples, Series, as_described
 from tendonfmu.diagnosis.selection import LeastSizes, Selection
 from tendonfmu.model import moment_arms
@@ -196,10 +196,10 @@ class View:
         reach = np.abs(self.series.angle[self.series.used]).max(axis=0, initial=0.0)
         return hypotheses(self.columns, moment_arms(self.data), reach)
 
-    def beside(self, keys: Collection[Key]) -> Selection:
+    def beside(self, keys: Collection[Where]) -> Selection:
         """Return what is missing if these causes are present, each with all its shapes at that place."""
         whole = self.selection
-        known = [cause for cause in whole.causes if cause.key in keys]
+        known = [cause for cause in whole.causes if cause.where in keys]
         return Selection(self.grams, whole.causes, self.least, known, whole.shares) if known else whole
 
     @cached_property

@@ -5,7 +5,7 @@
 - `candidate` says what a row is, and how it changes a description.
 """
 
-from tendonfmu.diagnosis.effects.candidate import Candidate, Column, Place, Term, Variant
+from tendonfmu.diagnosis.effects.candidate import Candidate, Column, Place, Term, Variant, Where
 from tendonfmu.diagnosis.effects.table import (
     BY_NAME,
     CALIBRATED,
@@ -32,5 +32,6 @@ __all__ = [
     "Place",
     "Term",
     "Variant",
+    "Where",
     "by_name",
 ]

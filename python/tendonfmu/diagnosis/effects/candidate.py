@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 from tendonfmu.arrays import Data
 from tendonfmu.diagnosis.samples import Span
@@ -165,12 +165,24 @@ Shape = Mapping[str, float]  # non-linear numbers of a term, by name
 Sizes = Mapping[str, list[tuple[float, str]]]  # last part of a path -> (value, unit) of each number
 
 
-@dataclass(frozen=True)
-class Place:
+class Place(NamedTuple):
     """Where an effect is."""
 
     joint: int | None = None  # number from 1; None if the place has none
     tendon: int | None = None
+
+
+@dataclass(frozen=True)
+class Where:
+    """An effect at a place."""
+
+    effect: str  # name of the effect
+    joint: int | None = None  # as of `Place`
+    tendon: int | None = None
+
+    @property
+    def place(self) -> Place:
+        return Place(self.joint, self.tendon)
 
 
 @dataclass(frozen=True)
@@ -321,6 +333,10 @@ class Term:
     shape: Shape = field(default_factory=dict)  # its non-linear numbers
     magnitudes: Sequence[float] = ()  # one per column, as estimated so far; () for an ordinary size
     fixed: bool = False  # whether a fit leaves its numbers as they are
+
+    @property
+    def where(self) -> Where:
+        return Where(self.candidate.name, *self.place)
 
     def added_to(self, data: Data) -> dict[str, Any]:
         """Return the description with this term."""

@@ -19,12 +19,12 @@ import numpy as np
 
 from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.candidate_columns import CandidateColumns, Proposal, candidate_columns
-from tendonfmu.diagnosis.effects import Candidate, Term
+from tendonfmu.diagnosis.effects import Candidate, Term, Where
 from tendonfmu.diagnosis.experiments.menu import Entry, combined, loads, motions, own_tension, recorded_of, tensions
 from tendonfmu.diagnosis.experiments.motion import expected_recording, perform
 from tendonfmu.diagnosis.extension_fit import number_columns
 from tendonfmu.diagnosis.names import Names, at_place, names_in
-from tendonfmu.diagnosis.result import Experiment, Where
+from tendonfmu.diagnosis.result import Experiment
 from tendonfmu.diagnosis.samples import Samples, Span, span_of
 from tendonfmu.errors import InputError, InternalError
 from tendonfmu.estimate import EstimationError
@@ -77,7 +77,7 @@ class Answer:
 
     @property
     def where(self) -> Where:
-        return _where(self.question.cause)
+        return self.question.cause.where
 
 
 @dataclass(frozen=True)
@@ -368,7 +368,7 @@ def _first_of_all(answers: Sequence[Answer], scores: Sequence[Sequence[Answer]],
     return Experiment(
         sentence=_sentence(separating, names),
         separates=tuple(
-            (answer.where, _where(answer.question.rival)) for answer in separating if answer.question.rival is not None
+            (answer.where, answer.question.rival.where) for answer in separating if answer.question.rival is not None
         ),
         makes_visible=tuple(answer.where for answer in separating if answer.question.rival is None),
         distance=min(answer.distance for answer in separating),
@@ -397,8 +397,4 @@ def _sentence(separating: Sequence[Answer], names: Names) -> str:
 
 
 def _described(cause: Term, names: Names) -> str:
-    return at_place(cause.candidate.title, _where(cause), names)
-
-
-def _where(cause: Term) -> Where:
-    return Where(cause.candidate.name, cause.place.joint, cause.place.tendon)
+    return at_place(cause.candidate.title, cause.where, names)
