@@ -119,41 +119,9 @@ def calibrate(
     options: CalibrateOptions = USUAL,
     progress: Callable[[PhaseState], None] | None = None,
 ) -> Calibration:
-    """Calibrate a finger on free motion.
-
-    Parameters
-    ----------
-    finger
-        Description; its structure is kept, and extended by the causes that a diagnosis finds.
-    free
-        Recordings of free motion.
-    folder
-        Folder for the results of the steps and the page of the diagnosis.
-    tests
-        Free motion to measure the errors on. Without it, that is every fifth stretch of 10 s of `free`, which is then
-        used for nothing else.
-    pushes
-        Recordings with labelled contact, to count what is found.
-    previous
-        Description or fit report of an earlier calibration, for little data: its structure stays, and its numbers are
-        the prior.
-    options
-        Further options.
-    progress
-        Called with the state of the computation.
-
-    Returns
-    -------
-    Calibration
-        Description and report.
-
-    Raises
-    ------
-    InputError
-        A file or an option does not allow a calibration.
-    KeyboardInterrupt
-        Says which steps are done and kept in the folder.
-    """
+    """Calibrate a finger on free motion; results of the steps and the page of the diagnosis go to the folder."""
+    # Without `tests`, every fifth stretch of 10 s of `free` is measured on and used for nothing else. `previous`, for
+    # little data: its structure stays, and its numbers are the prior. After Ctrl-C the steps that are done are kept.
     begun = perf_counter()
     phases = Phases(PHASES, progress or (lambda state: None))
     with phases.start("reading"):

@@ -39,23 +39,7 @@ class Stretch:
 
 
 class CoreRuns:
-    """Runs of a finger over recordings, whose numbers are set by path.
-
-    Attributes
-    ----------
-    grid
-        The blocks, B in all.
-    used
-        [B] whether a block may be learned from.
-    stretch
-        [B] the stretch without a gap that a block belongs to, from 0.
-    time, still
-        [B] centre of each block (s), and whether all joints stand still in it and its torque counts.
-    stretches
-        The stretches without a gap, thinned.
-    torque, speed
-        [B, n] torque to explain (N·m), and joint speeds (rad/s).
-    """
+    """Runs of a finger over recordings, whose numbers are set by path."""
 
     def __init__(
         self,
@@ -71,10 +55,10 @@ class CoreRuns:
         self.grid = make_grid(recordings) if grid is None else grid
         segments = self.grid.segments
         self.stretches = [_stretch(recordings[segment.recording], segment, rate) for segment in segments]
-        self.used: Flags = np.concatenate(
-            [_used(recordings[each.recording], each, self.grid.step) for each in segments]
-        )
+        used = [_used(recordings[each.recording], each, self.grid.step) for each in segments]
+        self.used: Flags = np.concatenate(used)  # blocks that may be learned from [B]
         self.stretch: Indices = np.repeat(np.arange(len(segments)), [segment.count for segment in segments])
+        # the stretch without a gap that each block belongs to, its centre (s), and joint speeds (rad/s)
         self.time: Numbers = self.grid.means([recording.time for recording in recordings])
         self.speed: Numbers = self.grid.means([recording.model.joint_speed for recording in recordings])
         fastest = self.grid.means([np.abs(recording.model.joint_speed) for recording in recordings])

@@ -77,24 +77,7 @@ class MemoryChoice:
 def choose_memory(
     finger: Finger, recordings: Sequence[FitRecording], choice: Choice | None = None, *, threads: int = 0
 ) -> MemoryChoice:
-    """Fit the forms of the memory to recordings and choose one.
-
-    Parameters
-    ----------
-    finger
-        Description; what it says of presliding and cord stretch is replaced.
-    recordings
-        Free motion; the samples of `train` count.
-    choice
-        Which other numbers are fitted.
-    threads
-        0: all cores.
-
-    Returns
-    -------
-    MemoryChoice
-        The finger with all its numbers fitted in the chosen form.
-    """
+    """Fit the forms of the memory, in place of what is described, to free motion, and choose one."""
     search = _Search(finger, recordings, choice or Choice(), threads)
     plain = search.fit("none", ())
     force = float(np.mean([recording.mean_force for recording in recordings]))

@@ -31,21 +31,7 @@ SAMPLES = 4000  # of each recording
 
 
 def replay_errors(file: Path, finger: Finger, recordings: Sequence[Recording]) -> Numbers:
-    """Replay recordings of free motion in a model.
-
-    At each sample MuJoCo computes the torque that the measured motion takes (inverse dynamics, with friction). The
-    tendons' share is the measured force times MuJoCo's arms there.
-
-    Returns
-    -------
-    array
-        Root of the mean square difference [n] (N·m).
-
-    Raises
-    ------
-    InputError
-        The recordings are too short to be smoothed.
-    """
+    """Return the rms (N·m) [n] of what MuJoCo's inverse dynamics leave of the torque in recordings of free motion."""
     model = CompiledModel(file)
     joints = [model.joint_named(str(name)) for name in finger.joint_names]
     tendons = [model.tendon_named(str(name)) for name in finger.tendon_names]

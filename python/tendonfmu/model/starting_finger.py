@@ -19,22 +19,8 @@ EXPECTED = 'expected a name and the joints that it passes, base first, each with
 
 
 def starting_finger(name: str, joints: Sequence[str], tendons: Sequence[str]) -> dict[str, Any]:
-    """Make a finger description from names alone.
-
-    Parameters
-    ----------
-    name
-        Name of the finger.
-    joints
-        Names of the joints, base first.
-    tendons
-        For each tendon a line such as "FDP mcp+ pip+": +, a pull turns the joint towards positive angles.
-
-    Raises
-    ------
-    InputError
-        A line is not understood, or a joint is not moved by any tendon.
-    """
+    """Make a description from names, joints base first, and a line for each tendon such as "FDP mcp+ pip+"."""
+    # +: a pull turns the joint towards positive angles
     for what, names in (("joint", list(joints)), ("tendon", [line.split()[0] for line in tendons if line.split()])):
         twice = next((each for each in names if names.count(each) > 1), None)
         if twice is not None or not names:
