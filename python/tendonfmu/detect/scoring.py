@@ -21,25 +21,9 @@ from tendonfmu.errors import InputError
 from tendonfmu.estimate import check_given_once
 from tendonfmu.files import counted
 from tendonfmu.fmu import check_model, outputs_of, run_fmu
-from tendonfmu.model import (
-    Finger,
-    FingerSource,
-    finger_file,
-    inputs_used,
-    native,
-    read_finger,
-    watches_motors,
-)
+from tendonfmu.model import Finger, FingerSource, finger_file, inputs_used, native, read_finger, watches_motors
 from tendonfmu.options import ScoreOptions
-from tendonfmu.recordings import (
-    GROUP_PER,
-    LABEL,
-    Recording,
-    RecordingSource,
-    gaps,
-    listed_sources,
-    read_recordings,
-)
+from tendonfmu.recordings import GROUP_PER, LABEL, Recording, RecordingSource, gaps, listed_sources, read_recordings
 
 Progress = Callable[[int, int], None]
 

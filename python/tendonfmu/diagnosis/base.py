@@ -65,12 +65,7 @@ class Base:
 def refitted(model: FittedModel, samples: Samples, settings: FitSettings, rough: bool = False) -> FittedModel:
     """Fit a model again, at the forces that it predicts."""
     return fit_numbers(
-        model.data,
-        samples.at_predicted_forces(model.data),
-        settings,
-        given=model.given,
-        fixed=model.fixed,
-        rough=rough,
+        model.data, samples.at_predicted_forces(model.data), settings, given=model.given, fixed=model.fixed, rough=rough
     )
 
 

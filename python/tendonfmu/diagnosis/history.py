@@ -37,16 +37,7 @@ from tendonfmu.diagnosis.result import ChangedSize
 from tendonfmu.errors import InputError
 from tendonfmu.model import Finger, read_finger
 from tendonfmu.statistics import Interval
-from tendonfmu.tasks import (
-    Job,
-    Phases,
-    fault_words,
-    refuse_if_all_failed,
-    row_file,
-    rows_of,
-    run_jobs,
-    version_here,
-)
+from tendonfmu.tasks import Job, Phases, fault_words, refuse_if_all_failed, row_file, rows_of, run_jobs, version_here
 
 File = str | os.PathLike[str]
 
@@ -205,10 +196,7 @@ def sizes_in(
     base = find_base(given.finger, given.reference, settings, least_gain)
     sizes = sizes_now(asked, base, [key for key in named if key not in kinematic.known])
     sizes += [(key, kinematic.known[key].size) for key in named if key in kinematic.known]
-    return {
-        "recording": recording,
-        "sizes": json.dumps({key_text(where): _written(size) for where, size in sizes}),
-    }
+    return {"recording": recording, "sizes": json.dumps({key_text(where): _written(size) for where, size in sizes})}
 
 
 def key_text(where: Where) -> str:

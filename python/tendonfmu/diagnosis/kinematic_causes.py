@@ -37,15 +37,7 @@ from tendonfmu.diagnosis.tendon_equation import (
     rows_of,
 )
 from tendonfmu.model import finger_from_data, moment_arms
-from tendonfmu.recordings import (
-    FitRecording,
-    Held,
-    Learned,
-    TendonRouting,
-    learn_routing,
-    prepare,
-    varying_sentences,
-)
+from tendonfmu.recordings import FitRecording, Held, Learned, TendonRouting, learn_routing, prepare, varying_sentences
 from tendonfmu.statistics import Interval
 
 # --- in words ---------------------------------------------------------------------------------------------------------

@@ -32,15 +32,7 @@ from tendonfmu.diagnosis.remainder_features import (
 from tendonfmu.diagnosis.remainder_learner import Learner
 from tendonfmu.diagnosis.result import RemainderMap, Unexplained
 from tendonfmu.diagnosis.samples import Series
-from tendonfmu.statistics import (
-    Interval,
-    Splines,
-    Whitener,
-    find_lines,
-    make_folds,
-    standard_error,
-    whitener,
-)
+from tendonfmu.statistics import Interval, Splines, Whitener, find_lines, make_folds, standard_error, whitener
 
 LEVEL = 0.01  # probability of a wrong "unknown", family-wise
 LEAST_SHARE = 0.02  # of the residual's variance: smaller parts are not reported

@@ -129,12 +129,7 @@ HISTORY = (0.1, 1.0, 10.0)  # s, for the trees
 
 
 def features(
-    series: Series,
-    *,
-    force: Numbers | None = None,
-    torque: Numbers | None = None,
-    seed: int = 0,
-    elastic: bool = False,
+    series: Series, *, force: Numbers | None = None, torque: Numbers | None = None, seed: int = 0, elastic: bool = False
 ) -> Features:
     """Compute all columns for the blocks of a series, standardised; constant columns are left out."""
     # torque: of the model, N·m [B, n]; a measured torque or force would carry the residual

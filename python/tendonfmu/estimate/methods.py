@@ -181,12 +181,7 @@ def learned_at(structure: Structure, recordings: Sequence[FitRecording]) -> Lear
 
 
 def _fitted(
-    estimator: Estimator,
-    begin: Numbers,
-    prior: Numbers,
-    settings: Settings,
-    watch: Watch,
-    what: str,
+    estimator: Estimator, begin: Numbers, prior: Numbers, settings: Settings, watch: Watch, what: str
 ) -> BatchResult:
     """Fit from `begin` [u]. `what` is added to the words of each phase. Raises Interrupted."""
     best, best_cost = begin, float("nan")

@@ -339,10 +339,7 @@ class _Places:
     def at(self, point: Sequence[float]) -> Point:
         x, y = (float(value) for value in point)
         drawing = self._drawing
-        return (
-            round(self.left + ALONG * (x - drawing.left), 1),
-            round(self.height - ACROSS * (drawing.height + y), 1),
-        )
+        return (round(self.left + ALONG * (x - drawing.left), 1), round(self.height - ACROSS * (drawing.height + y), 1))
 
     def path(self, points: Iterable[Sequence[float]]) -> str:
         return " ".join("{:g},{:g}".format(*self.at(point)) for point in points if np.isfinite(point).all())

@@ -53,9 +53,7 @@ def read_columns(file: Path, names: Sequence[str], known: Collection[str]) -> li
         listed = ", ".join(repr(name) for name in ignored)
         groups = ", ".join(f"{group}[i]" for group in GROUPS)
         warnings.warn(
-            f"{file}: ignored columns: {listed}; a recording has time, {groups} and {LABEL}",
-            InputWarning,
-            stacklevel=2,
+            f"{file}: ignored columns: {listed}; a recording has time, {groups} and {LABEL}", InputWarning, stacklevel=2
         )
     return ours
 

@@ -24,14 +24,7 @@ from tendonfmu.model import (
     velocity_threshold,
     watches_motors,
 )
-from tendonfmu.recordings.faults import (
-    SETTLING,
-    gap_sentences,
-    gaps,
-    rate_sentences,
-    silent_tendons,
-    stuck_sensors,
-)
+from tendonfmu.recordings.faults import SETTLING, gap_sentences, gaps, rate_sentences, silent_tendons, stuck_sensors
 from tendonfmu.recordings.recording import Recording, check_numbers
 from tendonfmu.recordings.residuals import Model, run_parts
 

@@ -194,10 +194,7 @@ def system_structure(rig: Rig) -> bytes:
     return xml_text(
         SSD.SystemStructureDescription(
             SSD.System(
-                SSD.Elements(
-                    component(PLANT, PLANT_FMU, plant),
-                    component(FRICTION, FRICTION_FMU, friction),
-                ),
+                SSD.Elements(component(PLANT, PLANT_FMU, plant), component(FRICTION, FRICTION_FMU, friction)),
                 SSD.Connections(*(connection(PLANT, name, FRICTION, name) for name in coupled)),
                 SSD.Annotations(_master_of_omsimulator(_relative_tolerance(rig))),
                 name="finger",

@@ -179,11 +179,7 @@ class Discrimination:
 
 
 def discriminating_motion(
-    folder: Path,
-    data: Mapping[str, Any],
-    *,
-    limits: Sequence[tuple[float, float]] | None = None,
-    rate: float = RATE,
+    folder: Path, data: Mapping[str, Any], *, limits: Sequence[tuple[float, float]] | None = None, rate: float = RATE
 ) -> Discrimination:
     """Read the experiment that a diagnosis asked for and compute its motion."""
     # limits: [n]
