@@ -104,16 +104,13 @@ def _by_pretension(judged: Judged) -> list[tuple[float, list[Flags]]]:
     all_force = np.concatenate(force)
     if not chosen.any():
         return []
+    owners = np.repeat(np.arange(len(times)), [len(time) for time in times])
     label: Indices = np.full(len(chosen), -1)
-    label[chosen] = pretension_of(all_force[chosen], np.concatenate(times)[chosen], _owners(times)[chosen])
+    label[chosen] = pretension_of(all_force[chosen], np.concatenate(times)[chosen], owners[chosen])
     ends = np.cumsum([len(mask) for mask in masks])[:-1]
     return [
         (float(all_force[label == group].mean()), np.split(label == group, ends)) for group in range(label.max() + 1)
     ]
-
-
-def _owners(times: Sequence[Numbers]) -> Indices:
-    return np.repeat(np.arange(len(times)), [len(time) for time in times])
 
 
 def typical_motion(before: Delivered, after: Delivered, judged: Judged) -> MotionShown:

@@ -121,18 +121,13 @@ def _coordinate_of(place: Place, kind: str, series: Series, joint: int) -> tuple
     of_joint: Mapping[str, tuple[str, str, Numbers]] = {
         "velocity": ("velocity", "rad/s", series.velocity),
         "angle": ("angle", "rad", series.angle),
-        "travel": ("travel since the last reversal", "rad", _signed_travel(series)),
+        "travel": ("travel since the last reversal", "rad", np.asarray(series.travel * np.sign(series.velocity))),
         "acceleration": ("acceleration", "rad/s²", series.acceleration),
     }
     if kind in of_joint:
         label, unit, values = of_joint[kind]
         return f"{label} of joint {own + 1}", unit, values[:, own]
     return "time", "s", series.time
-
-
-def _signed_travel(series: Series) -> Numbers:
-    """Return the travel since the last reversal with the sign of the motion [B, n], rad."""
-    return np.asarray(series.travel * np.sign(series.velocity))
 
 
 # --- all sides --------------------------------------------------------------------------------------------------------

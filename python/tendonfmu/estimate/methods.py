@@ -209,10 +209,6 @@ def _fitted(
     return result
 
 
-def _slack(samples: int) -> str:
-    return f"the filter did not learn from {counted(samples, 'sample')} in which the model found a tendon slack"
-
-
 def learn_ekf(
     structure: Structure, recordings: Sequence[FitRecording], watch: Watch, settings: Settings, start: Start | None
 ) -> Learned:
@@ -261,7 +257,9 @@ def learn_ekf(
         converged=True,
         weights=weights,
         innovations=innovations,
-        warnings=[_slack(learner.slack_samples)] if learner.slack_samples else [],
+        warnings=[f"the filter did not learn from {counted(slack, 'sample')} in which the model found a tendon slack"]
+        if (slack := learner.slack_samples)
+        else [],
     )
 
 

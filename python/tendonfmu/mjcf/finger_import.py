@@ -248,14 +248,9 @@ def _tendon_rows(
             if arm.slope:
                 yield {"effect": "moment_arm_variation", "joint": j + 1, "tendon": i + 1, "slope": arm.slope}
     for i, tendon in enumerate(tendons):
-        first = _first_joint(arms[i])
+        first = next((j for j, arm in enumerate(arms[i], start=1) if arm.arm != 0.0), None)
         if tendon.frictionloss and first is not None and not motors_of(model, tendon):
             yield {"effect": "preload_friction", "joint": first, "tendon": i + 1, "coulomb": tendon.frictionloss}
-
-
-def _first_joint(arms: Sequence[MomentArm]) -> int | None:
-    """Return the first joint (from 1) that a tendon turns, where all of its length slides; None without any."""
-    return next((j for j, arm in enumerate(arms, start=1) if arm.arm != 0.0), None)
 
 
 def _arm_warnings(

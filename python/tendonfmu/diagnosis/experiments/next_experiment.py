@@ -380,7 +380,8 @@ def _sentence(separating: Sequence[Answer], names: Names) -> str:
     """Say what to record for the first of the answers of one entry, and what one will know then."""
     first, *others = separating
     shown, rival = first.question.cause, first.question.rival
-    what = "; and ".join(_described(cause, names) for cause in (shown, rival) if cause is not None)
+    causes = [cause for cause in (shown, rival) if cause is not None]
+    what = "; and ".join(at_place(cause.candidate.title, cause.where, names) for cause in causes)
     if not first.separates:
         verb = "show this" if rival is None else "distinguish these two"
         return f"{NONE} {verb}: {what}. {shown.candidate.explanation}"
@@ -394,7 +395,3 @@ def _sentence(separating: Sequence[Answer], names: Names) -> str:
     rest = [f"{len(more) - LISTED} more"] * (len(more) > LISTED)
     also = f" It would also help to see: {'; '.join([*more[:LISTED], *rest])}." if more else ""
     return f"{first.entry.sentence} {purpose}{also}"
-
-
-def _described(cause: Term, names: Names) -> str:
-    return at_place(cause.candidate.title, cause.where, names)
