@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tendonfmu.arrays import Array, Data, Flags, Indices, Numbers
+from tendonfmu.arrays import Array, Data, Flags, Indices, Numbers, flagged_rows
 from tendonfmu.detect.counting import sample_seconds, stretches
 from tendonfmu.errors import InputError
 from tendonfmu.files import counted
 from tendonfmu.model import Finger, native, number_of
 from tendonfmu.options import KinematicsSource
-from tendonfmu.recordings import Held, Recording, flagged_rows, prepare
+from tendonfmu.recordings import Held, Recording, prepare
 
 # --- contact that a reference sensor shows ----------------------------------------------------------------------------
 

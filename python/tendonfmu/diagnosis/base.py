@@ -20,7 +20,7 @@ from tendonfmu.arrays import Data, Flags, Numbers
 from tendonfmu.diagnosis.effects import CANDIDATES, Candidate, Place, Term, Where, by_name
 from tendonfmu.diagnosis.effects.memory import memory_of, memory_terms
 from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel, extended_description, fit_numbers
-from tendonfmu.diagnosis.samples import Samples
+from tendonfmu.diagnosis.samples import Samples, shifted
 from tendonfmu.diagnosis.selection import LeastSizes, Selection, least_sizes
 from tendonfmu.diagnosis.view import View, look
 from tendonfmu.estimate import choose_memory
@@ -224,12 +224,4 @@ def delay_of_positions(data: Mapping[str, Any], recordings: Sequence[FitRecordin
 
 def _late_torque(samples: Samples, delay: float) -> Numbers:
     """Return the change of the block means of the target if it is taken `delay` s later, N·m [B, n]."""
-    shifted: list[Numbers] = []
-    for recording in samples.recordings:
-        own = recording.target.copy()
-        for part in recording.parts:
-            time = recording.time[part]
-            for j in range(own.shape[1]):
-                own[part, j] = np.interp(time + delay, time, recording.target[part, j])
-        shifted.append(own - recording.target)
-    return samples.grid.means(shifted)
+    return samples.grid.means([shifted(each, each.target, delay) - each.target for each in samples.recordings])

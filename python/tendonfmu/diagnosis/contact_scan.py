@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter, uniform_filter1d
 
-from tendonfmu.arrays import Data, Flags, Numbers
+from tendonfmu.arrays import Data, Flags, Numbers, flagged_rows
 from tendonfmu.detect import (
     SETTLING,
     ContactTuning,
@@ -380,9 +380,8 @@ def _pieces(recording: Recording, contact: Flags) -> list[Recording]:
     time = recording.time
     touched = time[contact]
     after = np.searchsorted(touched, time - AROUND) < np.searchsorted(touched, time + AROUND, side="right")
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], (~after).astype(np.int8), [0]])))
     pieces = []
-    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+    for begin, end in flagged_rows(~after):
         if time[end - 1] - time[begin] >= SHORTEST:
             groups = {name: np.ascontiguousarray(values[begin:end]) for name, values in recording.groups.items()}
             piece = Recording(Path(f"{recording.path}, from {time[begin]:.4g} s"), time[begin:end].copy(), groups)

@@ -236,7 +236,7 @@ def predicted_forces(data: Mapping[str, Any], recordings: Sequence[FitRecording]
         groups["tendon_force"] = predicted
         if "tendon_position" in groups:
             # a description with a delay pairs the present position with the force `delay` s later
-            change = _shifted(recording, (predicted - force) / stiffness, _delay(data))
+            change = shifted(recording, (predicted - force) / stiffness, _delay(data))
             groups["tendon_position"] = groups["tendon_position"] + change
         moved.append(replace(recording, recording=replace(recording.recording, groups=groups)))
     return moved
@@ -248,16 +248,16 @@ def _delay(data: Mapping[str, Any]) -> float:
     return float(sum(row["delay"] for row in rows if row["effect"] == "time_delay"))
 
 
-def _shifted(recording: FitRecording, values: Numbers, delay: float) -> Numbers:
+def shifted(recording: FitRecording, values: Numbers, delay: float) -> Numbers:
     """Return the values [N, m] of `delay` s later, within each part."""
     if not delay:
         return values
-    shifted: Numbers = values.copy()
+    later: Numbers = values.copy()
     for part in recording.parts:
         time = recording.time[part]
         for i in range(values.shape[1]):
-            shifted[part, i] = np.interp(time + delay, time, values[part, i])
-    return shifted
+            later[part, i] = np.interp(time + delay, time, values[part, i])
+    return later
 
 
 def _unexplained(data: Mapping[str, Any], recording: FitRecording) -> Numbers:
@@ -276,12 +276,7 @@ def with_late_forces(recordings: Sequence[FitRecording], delay: float) -> list[F
     late = []
     for recording in recordings:
         groups = dict(recording.recording.groups)
-        force = groups["tendon_force"].copy()
-        for part in recording.parts:
-            time = recording.time[part]
-            for i in range(force.shape[1]):
-                force[part, i] = np.interp(time - delay, time, groups["tendon_force"][part, i])
-        groups["tendon_force"] = force
+        groups["tendon_force"] = shifted(recording, groups["tendon_force"], -delay)
         late.append(replace(recording, recording=replace(recording.recording, groups=groups)))
     return late
 

@@ -50,7 +50,6 @@ if TYPE_CHECKING:
         Recording,
         RecordingSource,
         at_rows,
-        flagged_rows,
         flagged_stretches,
         listed_sources,
         read_recording,

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tendonfmu.arrays import Flags, Numbers
+from tendonfmu.arrays import Numbers, flagged_rows
 from tendonfmu.model import Finding, Finger
 from tendonfmu.recordings.counters import finest, wrap_of
 from tendonfmu.recordings.faults import tendon_angles
@@ -102,16 +102,9 @@ def _filled(time: Numbers, groups: Mapping[str, Numbers]) -> Iterator[Trap]:
     line = np.asarray((bend < STRAIGHT).all(axis=1) & moving)
     if line.mean() > MADE_UP:
         return
-    begin, end = _longest(line)
+    begin, end = max(flagged_rows(line), key=lambda run: run[1] - run[0], default=(0, 0))
     if end - begin >= FEWEST and time[end] - time[begin] > LONGEST_STRAIGHT:
         yield Trap("filled", tuple(groups), float(time[end + 1] - time[begin]), float(time[begin]))
-
-
-def _longest(flags: Flags) -> tuple[int, int]:
-    """Return begin and end of the longest run of true flags; (0, 0) if there is none."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
-    runs = [(int(begin), int(end)) for begin, end in edges.reshape(-1, 2)]
-    return max(runs, key=lambda run: run[1] - run[0], default=(0, 0))
 
 
 def _slow(time: Numbers, groups: Mapping[str, Numbers]) -> Iterator[Trap]:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.arrays import Flags, Numbers
+from tendonfmu.arrays import Flags, Numbers, flagged_rows
 from tendonfmu.statistics.intervals import Interval
 
 BLOCK = 2.0  # s; longer than residuals of a fitted finger are correlated
@@ -46,11 +46,11 @@ def blocks_of(time: Numbers, chosen: Flags, length: float = BLOCK) -> BlockIndex
     """Cut the chosen samples into blocks."""
     # time: [N] (s); chosen: [N]; length: (s)
     index = np.full(len(time), -1, dtype=np.intp)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], chosen.astype(np.int8), [0]])))
-    chosen_seconds = sum(float(time[end - 1] - time[begin]) for begin, end in zip(edges[::2], edges[1::2], strict=True))
+    stretches = flagged_rows(chosen)
+    chosen_seconds = sum(float(time[end - 1] - time[begin]) for begin, end in stretches)
     length = min(length, max(chosen_seconds / _FEW, _SHORTEST))
     count = 0
-    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+    for begin, end in stretches:
         span = float(time[end - 1] - time[begin])
         parts = max(1, round(span / length))
         if span < length / 2 and count:
