@@ -31,8 +31,7 @@ from tendonfmu.detect.learning import (
     weights_of,
 )
 from tendonfmu.detect.noise import Residuals, bias_noise, deviation, drift_variance, time_constant
-from tendonfmu.detect.pushes import pushed_part, size_found
-from tendonfmu.detect.tuning import QUARTERS, ContactTuning, TuneWarning, groups_of
+from tendonfmu.detect.tuning import QUARTERS, ContactTuning, TuneWarning, groups_of, pushed_part, size_found
 from tendonfmu.errors import InputError
 from tendonfmu.files.tables import read_table, write_table
 from tendonfmu.model import native, read_finger

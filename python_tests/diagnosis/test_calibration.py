@@ -10,14 +10,13 @@ import pytest
 from numpy.typing import NDArray
 
 from made_columns import UNSEEN, Made, candidate_columns, coloured, grams_of, waves
-from tendonfmu.diagnosis.calibration import PLAUSIBLE, calibrated, calibration, is_better
 from tendonfmu.diagnosis.candidate_columns import hypotheses
 from tendonfmu.diagnosis.effects import BY_NAME, Place, Term, Where
 from tendonfmu.diagnosis.extension_diagnosis import merged
 from tendonfmu.diagnosis.extension_fit import extended_description
 from tendonfmu.diagnosis.result import Cause, CausePlace
 from tendonfmu.diagnosis.samples import as_described, corrected_arms
-from tendonfmu.diagnosis.search import Trial, beside_calibration
+from tendonfmu.diagnosis.search import PLAUSIBLE, Trial, beside_calibration, calibrated, calibration, is_better
 from tendonfmu.diagnosis.selection import Selection
 from tendonfmu.diagnosis.view import View
 

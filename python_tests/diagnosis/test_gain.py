@@ -34,7 +34,7 @@ from tendonfmu.errors import InputError
 from tendonfmu.model.description import Finger, read_finger
 from tendonfmu.recordings.prepared import FitRecording, Held, prepare
 from tendonfmu.recordings.recording import Recording, read_recording
-from tendonfmu.statistics.paired_gain import blocks_of, gain_interval
+from tendonfmu.statistics.intervals import blocks_of, gain_interval
 
 Array = NDArray[Any]
 EXAMPLES = ROOT / "examples"

@@ -24,17 +24,21 @@ from time import perf_counter
 from typing import Any
 
 from tendonfmu.arrays import Data
-from tendonfmu.calibration.delivered import Delivered, Judged, compared, typical_motion, without_held_out
 from tendonfmu.calibration.fit import CalibratedFit, earlier_finger, fit_again, fit_all, stretches_for_diagnosis
 from tendonfmu.calibration.report import (
     OF_PUSH,
     OF_SCORE,
+    Delivered,
+    Judged,
+    compared,
     left_out,
     record_next,
     recording_of,
     structure_of,
     tuning_of,
+    typical_motion,
     typical_push,
+    without_held_out,
 )
 from tendonfmu.detect import ContactTuning, TuneWarning, require_no_contact, score_recordings
 from tendonfmu.detect import score_report as detect_score_report

@@ -3,8 +3,8 @@
 - `inputs` reads and checks recordings; `base` settles delay, position-dependent torque and memory.
 - `samples` is what runs of the core are compared with, and its signals; `view` turns both into columns.
 - `result` holds what the search names, from the candidate that is tried to the page.
-- `selection` judges candidates, `calibration` all corrections of sensors together; `search` adds what a description
-  lacks, `change_search` what has changed since a reference.
+- `selection` judges candidates; `search` judges all corrections of sensors together and adds what a description
+  lacks, `change_search` finds what has changed since a reference.
 - `extension_fit` fits the extended finger; `gain` measures on unseen data.
 - `extension_diagnosis` and `change_diagnosis` confirm and report; `diagnosis` begins.
 - `experiments` finds what to record next; `effects` holds the table of effects.

@@ -18,8 +18,14 @@ import numpy as np
 
 from tendonfmu.arrays import Data, Flags, Numbers
 from tendonfmu.diagnosis.effects import CANDIDATES, Candidate, Place, Term, Where, by_name
-from tendonfmu.diagnosis.effects.memory import memory_of, memory_terms
-from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel, extended_description, fit_numbers
+from tendonfmu.diagnosis.extension_fit import (
+    FitSettings,
+    FittedModel,
+    extended_description,
+    fit_numbers,
+    memory_of,
+    memory_terms,
+)
 from tendonfmu.diagnosis.samples import Samples, shifted
 from tendonfmu.diagnosis.selection import LeastSizes, Selection, least_sizes
 from tendonfmu.diagnosis.view import View, look

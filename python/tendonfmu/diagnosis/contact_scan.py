@@ -42,7 +42,7 @@ from tendonfmu.diagnosis.samples import Samples, Series
 from tendonfmu.errors import InputError
 from tendonfmu.model import Finger, finger_from_data
 from tendonfmu.recordings import FitRecording, Recording
-from tendonfmu.statistics import Folds, Interval, Splines, blocks_of, make_folds, paired_gain
+from tendonfmu.statistics import Folds, Interval, Splines, blocks_of, intervals, make_folds
 
 LEVEL = 0.01  # probability of any event in recordings without one
 LEAST = 5.5  # robust standard deviations: least height of an event, whatever the quartiles give
@@ -295,7 +295,7 @@ def _gain(within: float, samples: int, free: Numbers, free_samples: Numbers) -> 
     # `within` is Σ r² in the events, over `samples` samples. `free` is Σ r² of the blocks outside of events [B], over
     # `free_samples` samples [B].
     rest, count = float(free.sum()), float(free_samples.sum())
-    if len(free) < paired_gain.FEWEST or not rest > 0.0:
+    if len(free) < intervals.FEWEST_BLOCKS or not rest > 0.0:
         return None
     mean = rest / count
     # standard error of a ratio of sums, by blocks

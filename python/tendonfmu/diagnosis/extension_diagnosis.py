@@ -12,18 +12,23 @@ import numpy as np
 from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.answer import Asked, Compared, answered, not_taken, reported
 from tendonfmu.diagnosis.base import Base, refitted
-from tendonfmu.diagnosis.calibration import calibrated
 from tendonfmu.diagnosis.contact_scan import detection_gain, event_gain, events_of, without_events
 from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION, COMMON, OF_LAW, Term, Where
-from tendonfmu.diagnosis.effects.memory import PRESLIDING
 from tendonfmu.diagnosis.effects.places import law_of, thresholds
 from tendonfmu.diagnosis.experiments.next_experiment import Experiments, Question, plan_experiments
-from tendonfmu.diagnosis.extension_fit import FittedModel, cause_parameters, fit_extended, intervals_of, with_known
+from tendonfmu.diagnosis.extension_fit import (
+    PRESLIDING,
+    FittedModel,
+    cause_parameters,
+    fit_extended,
+    intervals_of,
+    with_known,
+)
 from tendonfmu.diagnosis.gain import Gain, Unseen, measure_gain
 from tendonfmu.diagnosis.remainder import measure_remainder, remainder_map, unexplained_of
 from tendonfmu.diagnosis.result import Cause, CausePlace, Diagnosis, Event, Invisible, Unexplained
 from tendonfmu.diagnosis.samples import Samples, Span, as_described, span_of
-from tendonfmu.diagnosis.search import Search, search, terms_of
+from tendonfmu.diagnosis.search import Search, calibrated, search, terms_of
 from tendonfmu.diagnosis.selection import SIGNIFICANCE, by_gain, confirmed, invisible_effects, names_with, step_p_value
 from tendonfmu.diagnosis.sizes import size_of
 from tendonfmu.estimate import SCALING

@@ -16,10 +16,9 @@ from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError, InternalError, own_fault
 from tendonfmu.estimate import FIT_REPORT
 from tendonfmu.files import counted, read_json, whole_file
-from tendonfmu.mjcf.compiled_model import CompiledModel, Joint
+from tendonfmu.mjcf.compiled_model import CompiledModel, Joint, XmlSource
 from tendonfmu.mjcf.finger_import import links_inertia
 from tendonfmu.mjcf.finger_parts import motors_of
-from tendonfmu.mjcf.xml_source import XmlSource
 from tendonfmu.model import Finger, Law, effects, extension_rows, read_finger, sides
 from tendonfmu.recordings import FEWEST, Recording, admit, gaps, read_recordings, tendon_angles, zero_phase
 

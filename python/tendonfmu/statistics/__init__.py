@@ -2,7 +2,7 @@
 
 Series are averaged over blocks, parts are held out, and splines remove a slow bias (`blocks`). Columns are judged by
 their Gram matrices (`block_grams`), noise is whitened and correlated samples are counted (`whitening`), and counts and
-measurements get an interval (`intervals`, `paired_gain`, `noisy_regression`).
+measurements get an interval (`intervals`, `noisy_regression`).
 """
 
 from typing import TYPE_CHECKING
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from . import intervals, paired_gain, quintic
+    from . import intervals, quintic
     from .block_grams import MEMORY, Grams, Products, bounded, standard_error
     from .blocks import (
         FEWEST_STRETCHES,
@@ -26,9 +26,8 @@ if TYPE_CHECKING:
         spline_basis,
         without,
     )
-    from .intervals import Interval
+    from .intervals import BlockIndex, Interval, blocks_of, gain_interval, variance_between
     from .noisy_regression import Estimate, noisy_regression
-    from .paired_gain import BlockIndex, blocks_of, gain_interval, variance_between
     from .random_numbers import LARGEST_SEED, Draws
     from .whitening import Line, Whitener, effective_samples, find_lines, sample_weights, whitener
 
