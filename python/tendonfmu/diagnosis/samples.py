@@ -228,17 +228,17 @@ def predicted_forces(data: Mapping[str, Any], recordings: Sequence[FitRecording]
     pulls = np.array([not tendon.get("bidirectional") for tendon in data["tendons"]])
     moved = []
     for recording in recordings:
-        groups = dict(recording.recording.groups)
+        groups = recording.recording.groups
         force = groups["tendon_force"]
         most = MOST_SHIFT * np.abs(force).max(initial=0.0)  # a model that explains nothing predicts no forces either
         shift = np.clip(_unexplained(data, recording) @ spread, -most, most)
         predicted = np.where(pulls & (force > 0), np.maximum(force - shift, 0.0), force - shift)
-        groups["tendon_force"] = predicted
+        changed = {"tendon_force": predicted}
         if "tendon_position" in groups:
             # a description with a delay pairs the present position with the force `delay` s later
             change = shifted(recording, (predicted - force) / stiffness, _delay(data))
-            groups["tendon_position"] = groups["tendon_position"] + change
-        moved.append(replace(recording, recording=replace(recording.recording, groups=groups)))
+            changed["tendon_position"] = groups["tendon_position"] + change
+        moved.append(recording.with_groups(**changed))
     return moved
 
 
@@ -273,12 +273,10 @@ def _unexplained(data: Mapping[str, Any], recording: FitRecording) -> Numbers:
 
 def with_late_forces(recordings: Sequence[FitRecording], delay: float) -> list[FitRecording]:
     """Return recordings whose forces come `delay` s later."""
-    late = []
-    for recording in recordings:
-        groups = dict(recording.recording.groups)
-        groups["tendon_force"] = shifted(recording, groups["tendon_force"], -delay)
-        late.append(replace(recording, recording=replace(recording.recording, groups=groups)))
-    return late
+    return [
+        each.with_groups(tendon_force=shifted(each, each.recording.groups["tendon_force"], -delay))
+        for each in recordings
+    ]
 
 
 # --- what range recordings cover --------------------------------------------------------------------------------------

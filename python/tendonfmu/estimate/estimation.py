@@ -282,7 +282,6 @@ class Learner:
         progress: LearnerWatch | None = None,
     ) -> dict[str, Numbers]:
         """Learn from a recording; the bias starts anew."""
-        # returns [N, n] [N, n] (N·m)
         with _refusals():
             innovation, variance, _ = self._learner.run(
                 **_samples(arrays),

@@ -41,13 +41,7 @@ def evaluate(start: Data, fitted: Data, recording: FitRecording) -> Evaluation:
         chosen = recording.train[part] if recording.train[part].any() else recording.tracked[part]
         if chosen.any():
             rest[part] -= rest[part][chosen].mean(axis=0)
-    return Evaluation(
-        recording=recording,
-        model=model,
-        start=recording.run(start),
-        bias_only=recording.run(without_friction(fitted)),
-        model_only=rest,
-    )
+    return Evaluation(recording, model, recording.run(start), recording.run(without_friction(fitted)), rest)
 
 
 def residual_entry(evaluations: Sequence[Evaluation], which: str) -> dict[str, list[float]] | None:
@@ -55,9 +49,8 @@ def residual_entry(evaluations: Sequence[Evaluation], which: str) -> dict[str, l
     chosen = [np.asarray(getattr(evaluation.recording, which)) for evaluation in evaluations]
     if not any(flags.any() for flags in chosen):
         return None
-    flags = np.concatenate(chosen) & ~np.isnan(
-        np.concatenate([evaluation.model.residual for evaluation in evaluations])
-    ).any(axis=1)
+    unknown = np.isnan(np.concatenate([evaluation.model.residual for evaluation in evaluations])).any(axis=1)
+    flags = np.concatenate(chosen) & ~unknown
     series = {
         "rms": [evaluation.model.residual for evaluation in evaluations],
         "start_rms": [evaluation.start.residual for evaluation in evaluations],

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -69,8 +69,9 @@ class Learned:
     passes: int
     converged: bool  # whether the method converged
     weights: list[Numbers]  # by recording, [N, n] the weight of each sample
-    innovations: list[Numbers]  # by recording, [N, n] standardised innovations, if the method computes them; else empty
-    warnings: list[str]  # sentences
+    # by recording, [N, n] standardised innovations, if the method computes them; else empty
+    innovations: list[Numbers] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)  # sentences
     memory: MemoryEvidence | None = None  # if friction remembers: then the estimator has no derivatives
 
 

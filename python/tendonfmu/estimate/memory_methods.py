@@ -285,7 +285,6 @@ def learned_of(
         passes=passes,
         converged=last.converged,
         weights=weights,
-        innovations=[],
         warnings=[] if last.converged else [f"not converged after {passes} steps"],
         memory=MemoryEvidence(problem, last),
     )

@@ -146,7 +146,6 @@ def learn_batch(
         passes=passes,
         converged=result.converged,
         weights=weights,
-        innovations=[],
         warnings=[]
         if result.converged
         else [f"not converged after {counted(result.passes, 'pass', 'passes')} over the data"],
@@ -175,8 +174,6 @@ def learned_at(structure: Structure, recordings: Sequence[FitRecording]) -> Lear
         passes=1,
         converged=True,
         weights=weights,
-        innovations=[],
-        warnings=[],
     )
 
 

@@ -34,7 +34,7 @@ class FitSeries:
     torque: Numbers  # [N, n] torque that the model has to explain: τ, or τ − external_torque where that was used (N·m)
     # [N, n] τ − T_eff before the bias update (`Estimator.innovations(...)[0]`); NaN for the first sample (N·m)
     residual: Numbers
-    model_torque: Numbers  # [N, n] T of eq
+    model_torque: Numbers  # [N, n] T of eq. (10) (N·m)
     joint_angle: Numbers  # [N, n] the kinematics in use (rad, rad/s)
     joint_speed: Numbers
     used: NDArray[np.bool_]  # [N] bool: trained on

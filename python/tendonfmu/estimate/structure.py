@@ -348,7 +348,6 @@ def _with_equal_values(data: Mapping[str, Any], numbers: Sequence[Unknown], owne
 
 def set_number(data: Any, path: str, value: float) -> None:
     """Set a number of a parsed description in place."""
-    # path: [1]
     *way, last = steps_of(path)
     for step in way:
         data = data[step]
@@ -367,7 +366,6 @@ def _value(data: Any, path: str) -> float:
 
 def get_number(data: Any, path: str) -> Any:
     """Return a number of a parsed description."""
-    # path: [1]
     for step in steps_of(path):
         data = data[step]
     return data

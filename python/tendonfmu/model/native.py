@@ -191,7 +191,6 @@ class Instance:
 
     def step_outputs(self) -> dict[str, Array]:
         """Return the arrays that `step` writes."""
-        # returns [n] [m]
         arrays = self._finger.step_outputs()
         return {name: array.view(bool) if array.dtype == np.uint8 else array for name, array in arrays.items()}
 

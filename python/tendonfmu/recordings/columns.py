@@ -60,7 +60,6 @@ def read_columns(file: Path, names: Sequence[str], known: Collection[str]) -> li
 
 def right_spelling(column: str) -> str | None:
     """Return the right name of a column that is one of ours in another spelling."""
-    # returns [1]
     match = _ONE_OF_OURS.fullmatch(re.sub(r"[\s_.\-()\[\]{}]", "", column).lower())
     if match is None:
         return None

@@ -139,7 +139,7 @@ def stuck_sensors(recording: Recording, finger: Finger) -> dict[str, list[StuckS
 
 def expected_values(recording: Recording, finger: Finger, group: str, k: int) -> Numbers | None:
     """Return what a channel should read according to the other channels, up to a constant."""
-    # group: (rad); returns [N]
+    # returns [N], in the unit of the channel
     groups = recording.groups
     if group == "tendon_position":
         return _position_by_others(groups, np.asarray(finger.moment_arms, dtype=float), _stretch(recording, finger), k)

@@ -50,7 +50,7 @@ class FitRecording:
 
     recording: Recording  # the recording itself
     kinematics: int  # source of angles and speeds, 1 to 3
-    target: Numbers  # torque that the model has to explain [N, n] (N·m): τ, or τ − external_torque (eq
+    target: Numbers  # torque that the model has to explain [N, n] (N·m): τ, or τ − external_torque
     train: Flags  # flags [N]; each sample has at most one of them
     held_out: Flags
     contact_out: Flags
@@ -94,13 +94,16 @@ class FitRecording:
         """Return the signals of one part."""
         return {name: np.ascontiguousarray(values[part]) for name, values in self.recording.arrays().items()}
 
+    def with_groups(self, **groups: Numbers) -> FitRecording:
+        """Return the recording with other signals of some groups."""
+        return replace(self, recording=replace(self.recording, groups={**self.recording.groups, **groups}))
+
     def run(self, data: Mapping[str, Any]) -> Model:
         """Run a finger over the recording; its bias learns from the tracked samples."""
         return run_parts(data, self.recording.arrays(), self.parts, self.tracked, self.kinematics)
 
     def entry(self) -> dict[str, Any]:
         """Return what a report says about the recording."""
-        # returns (s)
         return {
             "path": str(self.path),
             "samples": len(self.time),

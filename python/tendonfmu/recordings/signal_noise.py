@@ -209,5 +209,4 @@ def _lasting(values: Numbers) -> Numbers:
 
 def with_angles(recording: FitRecording, angle: Numbers) -> FitRecording:
     """Return a recording whose runs take these joint angles [N, n] (rad)."""
-    groups = {**recording.recording.groups, "joint_position": angle}
-    return replace(recording, recording=replace(recording.recording, groups=groups), kinematics=2)
+    return replace(recording.with_groups(joint_position=angle), kinematics=2)
