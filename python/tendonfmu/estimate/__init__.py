@@ -23,7 +23,7 @@ if TYPE_CHECKING:
         write_unfinished,
     )
     from .fisher_information import Noise, Progress, information, noise_of, sensitivities, unknowns
-    from .fit_report import evaluate, unseen_square
+    from .fit_report import FitPicture, FitSeries, LawBands, LawCurve, asymmetric, evaluate, numbers_of, unseen_square
     from .fitting import FitWarning, FrictionFit
     from .identifiability import EffectCoverage, Judgement, Verdict, counts_by_kind, coverage_of, durations, judge
     from .learning import (
@@ -41,7 +41,6 @@ if TYPE_CHECKING:
     from .memory_fit import MemoryProblem, minimise
     from .memory_methods import guess_prior
     from .methods import learn_batch
-    from .picture import FitPicture, FitSeries, LawBands, LawCurve, asymmetric, numbers_of
     from .structure import (
         MAGNITUDES,
         SCALING,

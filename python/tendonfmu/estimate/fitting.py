@@ -27,6 +27,8 @@ from tendonfmu.estimate.files import (
 )
 from tendonfmu.estimate.fit_report import (
     Evaluation,
+    FitPicture,
+    FitSeries,
     build_report,
     evaluate,
     fit_sentences,
@@ -39,7 +41,6 @@ from tendonfmu.estimate.identifiability import EffectCoverage, coverage_of, with
 from tendonfmu.estimate.learning import FrictionFitOptions, Interrupted, Learned, Watch, settings_of, unknown_names
 from tendonfmu.estimate.memory_choice import Remembered, learn_remembered
 from tendonfmu.estimate.methods import learn_batch, learn_ekf
-from tendonfmu.estimate.picture import FitPicture, FitSeries
 from tendonfmu.estimate.structure import Choice, build_structure, torque_scales, with_values
 from tendonfmu.estimate.verdicts import Fitted, judge_numbers, sizes_of
 from tendonfmu.model import Finger, FingerSource, description_text, number_of, read_finger

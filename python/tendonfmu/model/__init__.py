@@ -22,6 +22,7 @@ if TYPE_CHECKING:
         finger_from_text,
         read_finger,
         sides,
+        starting_finger,
     )
     from .description_numbers import (
         DEFAULTS,
@@ -77,6 +78,5 @@ if TYPE_CHECKING:
         finger_svg,
         keys_of,
     )
-    from .starting_finger import starting_finger
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)
