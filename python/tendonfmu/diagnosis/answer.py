@@ -136,8 +136,7 @@ def _coordinate_of(place: Place, kind: str, series: Series, joint: int) -> tuple
 def residual_views(
     series: Series, before: Numbers, after: Numbers, *, load: Numbers | None = None
 ) -> tuple[ResidualView, ...]:
-    """Return all pictures of the residual, joint after joint."""
-    # before, after: [B, n]; load: [B, n]
+    """Return all pictures of the residual, joint after joint. before, after: [B, n]; load: [B, n]."""
     return tuple(view for joint in range(before.shape[1]) for view in _of_joint(series, before, after, load, joint))
 
 

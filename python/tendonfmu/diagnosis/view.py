@@ -53,8 +53,7 @@ class Confirmation:
     """The residual of a description, and what refitting it can explain."""
 
     def __init__(self, series: Series, folds: Folds, splines: Splines, nominal: Columns) -> None:
-        """Prepare both tests."""
-        # splines: [B, s]; nominal: [B, n, u]
+        """Prepare both tests. splines: [B, s]; nominal: [B, n, u]."""
         joints = series.target.shape[1]
         white = whitener(series, residual_of(series, splines, nominal))
         plain = Whitener(np.zeros((0, joints)), np.ones(joints), series.used)

@@ -356,8 +356,7 @@ class LawBands:
         }
 
     def over_speed(self, start: Effect, fitted: Effect, sign: int, speed: Numbers) -> LawCurve:
-        """Compute the curve of an effect with a single law over speed."""
-        # speed: [N]; returns [N] each
+        """Compute the curve of an effect with a single law over speed. speed: [N]; returns [N] each."""
         weights = np.ones((len(speed), 1))
         return self._curve(start, fitted, sign, speed, weights)
 

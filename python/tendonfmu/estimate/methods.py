@@ -107,8 +107,7 @@ def _measured_weights(
 def learn_batch(
     structure: Structure, recordings: Sequence[FitRecording], watch: Watch, settings: Settings, start: Start | None
 ) -> Learned:
-    """Estimate by maximum likelihood."""
-    # start: [u]
+    """Estimate by maximum likelihood. start: [u]."""
     estimator = _estimator(structure, recordings)
     begin = _starting_point(estimator, start)
     if structure.needs_runs:

@@ -148,8 +148,7 @@ def _initial_torques(data: Mapping[str, Any]) -> list[Unknown]:
 
 
 def with_values(structure: Structure, values: Numbers) -> Finger:
-    """Replace the estimated numbers in the description of the start."""
-    # values: [p]
+    """Replace the estimated numbers in the description of the start. values: [p]."""
     data = own_copy(structure.start.data)
     for number in structure.numbers:
         for path in (number.path, number.with_path):

@@ -179,8 +179,7 @@ def _carries(model: CompiledModel, base: Joint, other: Joint) -> bool:
 def joint_ranges(
     model: CompiledModel, joints: Sequence[Joint], given: Mapping[str, tuple[float, float]]
 ) -> tuple[Numbers, list[str]]:
-    """Return the ranges of joints."""
-    # given: (rad); returns [n, 2] (rad)
+    """Return the ranges of joints [n, 2] (rad)."""
     names = [joint.name for joint in joints]
     for name in given:
         if name not in names:
@@ -352,8 +351,7 @@ def left_out(
     has_gravity: bool,
     has_links: bool,
 ) -> list[str]:
-    """List what an import leaves out."""
-    # angles: [K, n] (rad)
+    """List what an import leaves out. angles: [K, n] (rad)."""
     rows = [
         *_of_joints(model, joints, angles),
         *_of_tendons(model, joints, tendons, angles),

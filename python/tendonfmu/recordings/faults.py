@@ -65,8 +65,7 @@ class StuckSensor:
 
 
 def gaps(time: Numbers) -> list[int]:
-    """Return the first samples after gaps or jumps of the clock."""
-    # time: [N] (s)
+    """Return the first samples after gaps or jumps of the clock. time: [N] (s)."""
     if len(time) < 3:
         return []
     step = np.diff(time)

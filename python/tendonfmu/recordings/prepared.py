@@ -223,8 +223,7 @@ def _refuse_too_little(recording: Recording, parts: list[slice], usable: Flags, 
 
 
 def slack_sentences(slack: Flags, finger: Finger) -> list[str]:
-    """Describe tendons whose modelled force falls below zero."""
-    # slack: [N, m]
+    """Describe tendons whose modelled force falls below zero. slack: [N, m]."""
     share = slack.mean(axis=0)
     return [
         f"tendon {i + 1} ({finger.tendon_names[i]}) is slack in {percent(part)} of the samples: its modelled force "

@@ -52,8 +52,7 @@ def rate(count: int, exposure: float) -> Interval:
 
 
 def quantile(values: Numbers, probability: float, seed: int) -> Interval:
-    """Return a quantile, with an interval from resampled events (percentiles)."""
-    # values: [k]
+    """Return a quantile, with an interval from resampled events (percentiles). values: [k]."""
     if not len(values):
         return Interval(math.nan)
     value = float(np.quantile(values, probability))
@@ -116,15 +115,13 @@ class BlockIndex:
     count: int  # number of blocks
 
     def sums(self, values: Numbers) -> Numbers:
-        """Return the sums of values over the blocks."""
-        # values: [N]; returns [count]
+        """Return the sums of values over the blocks. values: [N]; returns [count]."""
         chosen = self.index >= 0
         return np.asarray(np.bincount(self.index[chosen], weights=values[chosen], minlength=self.count), dtype=float)
 
 
 def blocks_of(time: Numbers, chosen: Flags, length: float = BLOCK) -> BlockIndex:
-    """Cut the chosen samples into blocks."""
-    # time: [N] (s); chosen: [N]; length: (s)
+    """Cut the chosen samples into blocks. time: [N] (s); chosen: [N]; length: (s)."""
     index = np.full(len(time), -1, dtype=np.intp)
     stretches = flagged_rows(chosen)
     chosen_seconds = sum(float(time[end - 1] - time[begin]) for begin, end in stretches)

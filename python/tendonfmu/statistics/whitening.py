@@ -77,8 +77,7 @@ def valid_rows(series: BlockSeries, reach: int) -> Flags:
 
 
 def whitener(series: BlockSeries, residual: Numbers) -> Whitener:
-    """Estimate the filter of each joint."""
-    # residual: [B, n] (N·m)
+    """Estimate the filter of each joint. residual: [B, n] (N·m)."""
     most = _most_windows(series)
     valid = valid_rows(series, _reach(most))
     fits = [_autoregression(residual[:, j], valid, most) for j in range(residual.shape[1])]

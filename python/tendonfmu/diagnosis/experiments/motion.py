@@ -181,8 +181,7 @@ class Discrimination:
 def discriminating_motion(
     folder: Path, data: Mapping[str, Any], *, limits: Sequence[tuple[float, float]] | None = None, rate: float = RATE
 ) -> Discrimination:
-    """Read the experiment that a diagnosis asked for and compute its motion."""
-    # limits: [n]
+    """Read the experiment that a diagnosis asked for and compute its motion. limits: [n]."""
     report = _read_report(folder / REPORT)
     experiment = report.get("experiment") or {}
     motion = experiment.get("motion") or {}

@@ -114,8 +114,7 @@ def plan_experiments(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Experiments:
-    """Choose experiments from the menu."""
-    # noise: [n]
+    """Choose experiments from the menu. noise: [n]."""
     if not questions:
         return Experiments((), Experiment(""))
     if not recordings:
