@@ -3,16 +3,36 @@
 
 from __future__ import annotations
 
-INPUTS = ("tendon_force", "tendon_position", "joint_position", "joint_velocity")
+INPUTS = (
+    "tendon_force",
+    "tendon_position",
+    "joint_position",
+    "joint_velocity",
+)
 
 # numbers of every finger that have a directional derivative
-NUMBERS = ("compensated_torque", "joint_torque", "friction_torque", "bias_torque", "joint_angle", "joint_speed")
+NUMBERS = (
+    "compensated_torque",
+    "joint_torque",
+    "friction_torque",
+    "bias_torque",
+    "joint_angle",
+    "joint_speed",
+)
 
 # flags of every finger
-FLAGS = ("joint_contact", "contact", "slack")
+FLAGS = (
+    "joint_contact",
+    "contact",
+    "slack",
+)
 
 # numbers without a derivative; FMUs of older versions lack them
-OPTIONAL_NUMBERS = ("compensated_torque_std", "residual", "contact_level")
+OPTIONAL_NUMBERS = (
+    "compensated_torque_std",
+    "residual",
+    "contact_level",
+)
 
 # of fingers with links, and of their FMUs
 PLACE = (
@@ -24,7 +44,13 @@ PLACE = (
 )
 
 # of fingers with sensor_fault, and of their FMUs
-SENSORS = ("sensor_fault", "contact_observable")
+SENSORS = (
+    "sensor_fault",
+    "contact_observable",
+)
 
 # outputs that are vectors in space
-VECTORS = ("fingertip_force", "fingertip_force_std")
+VECTORS = (
+    "fingertip_force",
+    "fingertip_force_std",
+)
