@@ -64,7 +64,7 @@ def small_fmu3(small_fmu3_path: Path) -> UnpackedFmu:
 @pytest.fixture(scope="session")
 def plant_fmu_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The simulated finger of plant_fmu_rig.fmu_rig(), its rig.json beside it."""
-    from tendonfmu.simulate.fmu_packaging import build_plant_fmu
+    from tendonfmu.simulate.ssp import build_plant_fmu
 
     folder = tmp_path_factory.mktemp("plant_fmu")
     (folder / "rig.json").write_text(json.dumps(fmu_rig()))

@@ -15,6 +15,12 @@ Array = NDArray[Any]
 Data = Mapping[str, Any]  # parsed JSON
 
 
+def flagged_rows(flags: Array) -> list[tuple[int, int]]:
+    """Return the first row of each stretch of flagged samples [N], and the row after its last."""
+    steps = np.diff(np.concatenate([[0], np.asarray(flags).astype(bool).astype(int), [0]]))
+    return list(zip(np.flatnonzero(steps > 0).tolist(), np.flatnonzero(steps < 0).tolist(), strict=True))
+
+
 def rounded(values: Numbers, digits: int) -> list[float]:
     """Round numbers to significant digits, as a description holds them."""
     return [float(f"{value:.{digits}g}") for value in values]

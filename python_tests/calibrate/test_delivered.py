@@ -16,7 +16,7 @@ from command import Call, DemoRun
 from pushed_finger import FINGER, FREE, UNSEEN, pushed
 from tendonfmu.calibration import calibration
 from tendonfmu.calibration.calibration import Calibration, calibrate
-from tendonfmu.calibration.delivered import Delivered, Judged
+from tendonfmu.calibration.report import Delivered, Judged
 from tendonfmu.detect import stretches
 from tendonfmu.detect.scoring import scaled_detection
 from tendonfmu.files.tables import write_table

@@ -18,17 +18,20 @@ from command import Call, run_script
 from repository_paths import ROOT
 from tendonfmu.detect.free_motion import FreePart, free_parts
 from tendonfmu.detect.learning import (
+    BANDS,
+    NAMES,
+    Terms,
+    bands_of,
     close_the_loop,
     gamma_weights,
     levels_of,
     numbers_of,
     seconds_of,
+    terms_of,
     weights_of,
 )
 from tendonfmu.detect.noise import Residuals, bias_noise, deviation, drift_variance, time_constant
-from tendonfmu.detect.pushes import pushed_part, size_found
-from tendonfmu.detect.terms import BANDS, NAMES, Terms, bands_of, terms_of
-from tendonfmu.detect.tuning import QUARTERS, ContactTuning, TuneWarning, groups_of
+from tendonfmu.detect.tuning import QUARTERS, ContactTuning, TuneWarning, groups_of, pushed_part, size_found
 from tendonfmu.errors import InputError
 from tendonfmu.files.tables import read_table, write_table
 from tendonfmu.model import native, read_finger

@@ -10,14 +10,13 @@ import pytest
 from numpy.typing import NDArray
 
 from made_columns import UNSEEN, Made, candidate_columns, coloured, grams_of, waves
-from tendonfmu.diagnosis.calibration import PLAUSIBLE, calibrated, calibration, is_better
-from tendonfmu.diagnosis.cause import Cause, CausePlace, Where
-from tendonfmu.diagnosis.cause_gains import merged
-from tendonfmu.diagnosis.effects import BY_NAME, Place, Term
+from tendonfmu.diagnosis.candidate_columns import hypotheses
+from tendonfmu.diagnosis.effects import BY_NAME, Place, Term, Where
+from tendonfmu.diagnosis.extension_diagnosis import merged
 from tendonfmu.diagnosis.extension_fit import extended_description
-from tendonfmu.diagnosis.hypotheses import hypotheses
+from tendonfmu.diagnosis.result import Cause, CausePlace
 from tendonfmu.diagnosis.samples import as_described, corrected_arms
-from tendonfmu.diagnosis.search import Trial, beside_calibration
+from tendonfmu.diagnosis.search import PLAUSIBLE, Trial, beside_calibration, calibrated, calibration, is_better
 from tendonfmu.diagnosis.selection import Selection
 from tendonfmu.diagnosis.view import View
 
@@ -68,7 +67,7 @@ def test_several_small_errors_are_one_cause_with_their_sizes() -> None:
 
 def test_one_sensor_that_is_off_keeps_its_name() -> None:
     together, single = judged(ONE)
-    assert together is not None and single is not None and single.key == ("force_gain", None, 2)
+    assert together is not None and single is not None and single.where == Where("force_gain", None, 2)
     assert not is_better(together, single, LEAST_GAIN)
     (alike,) = beside_calibration(Trial(single, None, single.unseen), together).cause.alike[-1:]
     assert alike.effect == "calibration"  # it may be several as well

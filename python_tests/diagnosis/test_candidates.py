@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -19,10 +18,9 @@ from numpy.typing import NDArray
 
 from tendonfmu.diagnosis.candidate_columns import CandidateColumns, Proposal, candidate_columns
 from tendonfmu.diagnosis.effects import CANDIDATES, Place, Variant, by_name
-from tendonfmu.diagnosis.effects.description_edit import add_to_number
+from tendonfmu.diagnosis.effects.candidate import add_to_number
 from tendonfmu.diagnosis.extension_fit import number_columns
-from tendonfmu.diagnosis.samples import Samples
-from tendonfmu.diagnosis.span import Span, _turning_points, span_of
+from tendonfmu.diagnosis.samples import Samples, Span, span_of
 from tendonfmu.estimate import unknowns
 from tendonfmu.estimate.structure import own_copy
 from tendonfmu.model import native
@@ -304,35 +302,3 @@ def test_a_pulley_has_few_forms_however_far_a_joint_seems_to_turn() -> None:
         return len(by_name("pulley_eccentricity").find_shapes({}, Place(1, 1), span))  # type: ignore[arg-type]
 
     assert forms(1.0) > 1 and forms(100.0) <= 62 and forms(1e9) <= 62
-
-
-# --- where a path turns -----------------------------------------------------------------------------------------------
-
-TURNS = [0.0, 2.0, 0.5, 3.0, -1.0]
-DEAD = 0.1
-
-
-def path_through(turns: list[float], samples: int) -> np.ndarray:
-    """A path that goes straight from turn to turn, and rests for a while at each."""
-    strokes = [np.linspace(a, b, samples) for a, b in pairwise(turns)]
-    return np.concatenate([np.append(stroke, [stroke[-1]] * 3) for stroke in strokes])
-
-
-@pytest.mark.parametrize("samples", [2, 3, 50])
-def test_a_path_turns_where_it_reverses(samples: int) -> None:
-    """However many samples a stroke has."""
-    np.testing.assert_array_equal(_turning_points(path_through(TURNS, samples), DEAD), TURNS)
-
-
-def test_what_is_smaller_than_the_dead_zone_is_no_turn() -> None:
-    """The farthest point counts, noise included."""
-    path = path_through(TURNS, 200)
-    noisy = path + np.random.default_rng(1).uniform(-0.04, 0.04, len(path))
-    found = _turning_points(noisy, DEAD)
-    assert len(found) == len(TURNS)
-    np.testing.assert_allclose(found, TURNS, atol=0.04)
-
-
-def test_a_path_that_does_not_move_has_no_turn() -> None:
-    assert _turning_points(np.full(20, 0.3), 0.0).tolist() == [0.3]
-    assert _turning_points(np.array([0.3]), DEAD).tolist() == [0.3, 0.3]

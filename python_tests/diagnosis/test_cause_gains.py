@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from fit_cases import small_finger
-from tendonfmu.diagnosis import cause_gains
+from tendonfmu.diagnosis import extension_diagnosis
 from tendonfmu.diagnosis import extension_diagnosis as whole
 from tendonfmu.diagnosis.answer import not_taken
-from tendonfmu.diagnosis.cause import Cause, Where
-from tendonfmu.diagnosis.effects import Place, Term, by_name
+from tendonfmu.diagnosis.effects import Place, Term, Where, by_name
+from tendonfmu.diagnosis.result import Cause
 from tendonfmu.statistics import Interval
 
 
@@ -21,7 +21,7 @@ def test_each_further_name_needs_more() -> None:
     """What every finger has does not count: presliding, a delay."""
     causes = [Cause(Where(effect)) for effect in ("presliding", "gravity", "stribeck")]
     gains = [Interval(0.9 - 0.1 * k, 0.0, 1.0) for k in range(len(causes))]
-    assert cause_gains._needed(causes, gains) == [1.0, 1.0, 2.0]
+    assert extension_diagnosis._needed(causes, gains) == [1.0, 1.0, 2.0]
 
 
 def in_nominal(data: Any, effect: Term) -> bool:
@@ -63,7 +63,7 @@ def test_a_cause_that_is_significant_is_too_small_or_uncertain() -> None:
             ("backlash", (-0.1, -0.2, 0.0)),
         )
     )
-    parts = not_taken([small, wide, none], {none.key: "move slowly"}, 40.0)
+    parts = not_taken([small, wide, none], {none.where: "move slowly"}, 40.0)
     assert [cause.effect for cause in parts["too_small"]] == ["inertia"]
     assert [cause.experiment for cause in parts["uncertain"]] == [
         "test on 90 s of such motion, in place of 40 s",  # 1.2 · (0.19/0.14)² · 40 s

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from repetitions import repeated
 from synthetic_series import make_series
+from tendonfmu.diagnosis.change_diagnosis import steady_load
 from tendonfmu.diagnosis.diagnosis import diagnose
-from tendonfmu.diagnosis.reported import reported_causes
+from tendonfmu.diagnosis.names import reported_causes
 from tendonfmu.diagnosis.result import Diagnosis, SteadyLoad
-from tendonfmu.diagnosis.series import Series
-from tendonfmu.diagnosis.steady_load import steady_load
+from tendonfmu.diagnosis.samples import Series
 from worn_finger import WELL, How, finger, record, recording
 
 LOAD = 0.05  # N·m

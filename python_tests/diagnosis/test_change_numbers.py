@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import json
 import re
+from dataclasses import astuple
 from importlib.resources import files as files_of
 from typing import Any
 
@@ -13,9 +14,9 @@ import pytest
 
 from fit_cases import small_finger
 from random_fingers import random_extended, random_finger
-from tendonfmu.diagnosis.cause import EVERYWHERE, HERE, SOMEWHERE, Cause
-from tendonfmu.diagnosis.effects.description_edit import data_number
-from tendonfmu.diagnosis.hypotheses import Number, estimator_of, number_hypotheses, numbers_of, with_numbers
+from tendonfmu.diagnosis.candidate_columns import Number, estimator_of, number_hypotheses, numbers_of, with_numbers
+from tendonfmu.diagnosis.effects.candidate import data_number
+from tendonfmu.diagnosis.result import EVERYWHERE, HERE, SOMEWHERE, Cause
 from worn_finger import described
 
 Description = dict[str, Any]
@@ -78,13 +79,13 @@ def test_every_number_can_have_with_numbers(seed: int) -> None:
                 for number, step in zip(numbers, moved, strict=True):
                     slack = 1e-9 * (abs(number.value) + abs(step))  # rounding
                     if each.effect != "asymmetric_friction":
-                        assert number.low - slack <= number.value + step <= number.high + slack, (each.key, number)
+                        assert number.low - slack <= number.value + step <= number.high + slack, (each.where, number)
     assert covered.all()
 
 
 def by_key(data: Description) -> dict[tuple[str, int | None, int | None], Cause]:
     numbers = numbers_of(data)
-    return {each.key: each for each in number_hypotheses(numbers, len(numbers), 0)}
+    return {astuple(each.where): each for each in number_hypotheses(numbers, len(numbers), 0)}
 
 
 def test_places_of_one_effect_can_have_changed_together() -> None:

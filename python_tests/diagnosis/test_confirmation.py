@@ -10,10 +10,9 @@ from scipy.stats import binom
 from made_columns import BLOCKS, JOINTS, STEP, coloured, series_with, waves
 from repetitions import repeated
 from synthetic_series import bias_splines
-from tendonfmu.diagnosis.confirmation import Confirmation
-from tendonfmu.diagnosis.series import Series
-from tendonfmu.statistics.blocks import make_folds
-from tendonfmu.statistics.splines import basis, without
+from tendonfmu.diagnosis.samples import Series
+from tendonfmu.diagnosis.view import Confirmation
+from tendonfmu.statistics.blocks import basis, make_folds, without
 from tendonfmu.statistics.whitening import valid_rows, whitener
 
 Numbers = NDArray[np.float64]

@@ -15,7 +15,7 @@ from repetitions import repeated
 from synthetic_series import bias_splines, make_series, nuisance_of, residual_of, with_effect
 from tendonfmu.diagnosis.contact_scan import event_gain, left_out, scan_events, unusual
 from tendonfmu.diagnosis.result import Event
-from tendonfmu.diagnosis.series import Series
+from tendonfmu.diagnosis.samples import Series
 
 PUSHES = ((8.0, 8.4, 0, 1.0), (21.0, 22.4, 1, -1.0), (37.0, 37.8, 1, 1.0), (50.0, 51.1, 0, -1.0))  # s, s, joint, sign
 

@@ -19,14 +19,14 @@ from repetitions import repeated
 from tendonfmu.diagnosis import base as base_module
 from tendonfmu.diagnosis import search as search_module
 from tendonfmu.diagnosis.base import delay_of_positions, find_base
-from tendonfmu.diagnosis.cause import Cause, Where, with_error
-from tendonfmu.diagnosis.cause_gains import merged
 from tendonfmu.diagnosis.diagnosis import PHASES
-from tendonfmu.diagnosis.effects import Place, Term, by_name
+from tendonfmu.diagnosis.effects import Place, Term, Where, by_name
+from tendonfmu.diagnosis.extension_diagnosis import merged
 from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel
-from tendonfmu.diagnosis.least_sizes import LeastSizes, least_sizes
+from tendonfmu.diagnosis.result import Cause, with_error
 from tendonfmu.diagnosis.samples import Samples, as_described, corrected_arms, predicted_forces
 from tendonfmu.diagnosis.search import ExtensionSearch, Trial, search
+from tendonfmu.diagnosis.selection import LeastSizes, least_sizes
 from tendonfmu.model.description import Finger
 from tendonfmu.model.native import Instance
 from tendonfmu.recordings.prepared import FitRecording, Held, prepare
@@ -203,7 +203,7 @@ def test_negative_friction_is_no_cause() -> None:
         {"effect": "load_friction", "joint": 1, "tendon": i, "coulomb": size} for i, size in ((1, 1e-4), (2, -2e-4))
     ]
     terms = [Term(by_name("load_friction"), Place(1, i)) for i in (1, 2)]
-    least = LeastSizes(np.zeros(2), np.zeros(2), 0.005, 0.0)
+    least = LeastSizes(np.zeros(2), np.zeros(2), 0.005)
     assert not least.shows_all("load_friction", terms, finger() | {"extensions": rows})
     assert least.shows_all("load_friction", terms[:1], finger() | {"extensions": rows})
 
@@ -216,7 +216,7 @@ def test_least_sizes_follow_the_sensors(sound: FitRecording) -> None:
     before, after = (least_sizes(finger(), [each], 0.005) for each in (sound, noisy))
     assert after.tendon_noise == pytest.approx(np.hypot(before.tendon_noise, 1e-5 * np.sqrt(0.85)), rel=0.15)
     assert np.all(after.joint_noise > 2.0 * before.joint_noise)
-    assert after.least("time_delay", None, None) == pytest.approx(0.75 * 0.005)
+    assert after.least(Where("time_delay")) == pytest.approx(0.75 * 0.005)
 
 
 # --- causes -----------------------------------------------------------------------------------------------------------
@@ -242,7 +242,7 @@ def test_places_of_one_effect_are_one_cause() -> None:
         ]
     )
     load, gravity = found
-    assert load.key == ("load_friction", 1, None) and gravity.key == ("gravity", None, None)
+    assert load.where == Where("load_friction", 1) and gravity.where == Where("gravity")
     assert [each.place for each in load.terms] == [Place(1, 1), Place(1, 2)]
     assert load.p_value == 1e-6
     # each of the places has its own rivals; what is named itself is none
@@ -256,7 +256,7 @@ def test_a_hidden_spring_is_found_and_fitted(hidden: FitRecording) -> None:
     phases = Phases(PHASES, lambda state: seen.append(state.words))
     found = search(base, least_gain=0.03, seed=1, phases=phases)
     first = found.causes[0]
-    assert ("cover_stiffness", 2, None) in [first.key, *(each.key for each in first.alike)]
+    assert Where("cover_stiffness", 2) in [first.where, *(each.where for each in first.alike)]
     assert len(found.causes) <= 2
     if first.effect == "cover_stiffness":
         assert found.extended.data["joints"][1]["cover"]["stiffness"] == pytest.approx(0.02, rel=0.2)

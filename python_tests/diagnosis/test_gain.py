@@ -19,7 +19,7 @@ from fit_cases import lasting_finger
 from fit_data import make_recording, wavy_forces, wavy_motion
 from repository_paths import ROOT
 from tendonfmu.diagnosis.change_search import gain_of, interval_of
-from tendonfmu.diagnosis.contact_gain import detection_gain
+from tendonfmu.diagnosis.contact_scan import detection_gain
 from tendonfmu.diagnosis.effects import CANDIDATES, Place, Term
 from tendonfmu.diagnosis.extension_fit import (
     FitSettings,
@@ -34,7 +34,7 @@ from tendonfmu.errors import InputError
 from tendonfmu.model.description import Finger, read_finger
 from tendonfmu.recordings.prepared import FitRecording, Held, prepare
 from tendonfmu.recordings.recording import Recording, read_recording
-from tendonfmu.statistics.paired_gain import blocks_of, gain_interval
+from tendonfmu.statistics.intervals import blocks_of, gain_interval
 
 Array = NDArray[Any]
 EXAMPLES = ROOT / "examples"

@@ -14,9 +14,8 @@ import pytest
 
 from command import Call
 from repetitions import repeated
-from tendonfmu.diagnosis.cause import Cause
 from tendonfmu.diagnosis.diagnosis import diagnose
-from tendonfmu.diagnosis.result import Diagnosis
+from tendonfmu.diagnosis.result import Cause, Diagnosis
 from tendonfmu.model import native
 from worn_finger import WELL, How, Worn, finger, record, recording, write_files
 

@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from dask_on_loopback import dask_processes
 from tendonfmu.diagnosis import history as change_history
-from tendonfmu.diagnosis.cause import ChangedSize, Where
+from tendonfmu.diagnosis.effects import Where
 from tendonfmu.diagnosis.history import History, Line, Size, diagnose_history, share_of, slope, times_of
 from tendonfmu.diagnosis.names import Names
+from tendonfmu.diagnosis.result import ChangedSize
 from tendonfmu.errors import InputError, InternalError
 from tendonfmu.files.json_node import finite
 from tendonfmu.model import read_finger

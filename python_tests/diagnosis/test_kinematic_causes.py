@@ -16,10 +16,10 @@ import pytest
 from command import Call
 from encoder_finger import EncoderFinger, encoder_finger
 from repetitions import repeated
-from tendonfmu.diagnosis.cause import Cause
 from tendonfmu.diagnosis.inputs import read_input
 from tendonfmu.diagnosis.kinematic_causes import KinematicCauses, find_kinematic_causes
-from tendonfmu.diagnosis.moved_zeros import encoder_offsets
+from tendonfmu.diagnosis.result import Cause
+from tendonfmu.diagnosis.tendon_equation import encoder_offsets
 from tendonfmu.files import write_table
 
 FINGER = encoder_finger(1)  # two joints, four tendons

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from tendonfmu.diagnosis.effects import CANDIDATES, Place, Term
-from tendonfmu.diagnosis.experiments.discrimination import discriminating_motion
 from tendonfmu.diagnosis.experiments.menu import (
     WIDER,
     Entry,
@@ -23,11 +22,10 @@ from tendonfmu.diagnosis.experiments.menu import (
     motions,
     tensions,
 )
-from tendonfmu.diagnosis.experiments.motion import expected_recording, perform
+from tendonfmu.diagnosis.experiments.motion import discriminating_motion, expected_recording, perform
 from tendonfmu.diagnosis.experiments.next_experiment import Experiments, Question, plan_experiments
 from tendonfmu.diagnosis.extension_fit import FitSettings, extended_description, fit_numbers
-from tendonfmu.diagnosis.samples import Samples
-from tendonfmu.diagnosis.series import exact_model
+from tendonfmu.diagnosis.samples import Samples, exact_model
 from tendonfmu.errors import InputError
 from tendonfmu.files.json_node import Node
 from tendonfmu.files.tables import write_table

@@ -11,9 +11,9 @@ from scipy.signal import lfilter
 
 from repetitions import repeated
 from synthetic_series import bias_splines, low_passed, make_series, nuisance_of, residual_of, with_effect
-from tendonfmu.diagnosis.pictures import residual_views, whiteness
+from tendonfmu.diagnosis.answer import residual_views, whiteness
 from tendonfmu.diagnosis.remainder import measure_remainder
-from tendonfmu.diagnosis.series import Series
+from tendonfmu.diagnosis.samples import Series
 
 Numbers = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ import pytest
 
 from synthetic_series import ARMS, STEP, make_series
 from tendonfmu.diagnosis.reference import Repeat, find_repeats, less_reference, outside
-from tendonfmu.diagnosis.series import Series
+from tendonfmu.diagnosis.samples import Series
 
 SECONDS = 12.0
 

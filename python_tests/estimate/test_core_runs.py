@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from fit_cases import small_finger
 from fit_finger import made_recording
-from tendonfmu.estimate.core_runs import CoreRuns
-from tendonfmu.estimate.slow_drift import SlowDrift, slowest_drift
+from tendonfmu.estimate.core_runs import CoreRuns, SlowDrift, slowest_drift
 from tendonfmu.model import finger_from_data, native, without_learning
 from tendonfmu.recordings import FitRecording, Held, Recording, prepare
 

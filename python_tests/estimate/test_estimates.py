@@ -15,7 +15,7 @@ from fit_data import make_recording, wavy_motion
 from fit_finger import made_recording, moved_start
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import FrictionFit, known_numbers
-from tendonfmu.estimate.estimates import with_estimates
+from tendonfmu.estimate.files import with_estimates
 from tendonfmu.estimate.structure import estimable_numbers, get_number, set_number
 from tendonfmu.model import native, read_finger
 from tendonfmu.recordings import Recording

@@ -10,10 +10,9 @@ import pytest
 from test_core_runs import REMEMBERING, finger
 
 from fit_finger import made_recording
-from tendonfmu.estimate.core_runs import CoreRuns
+from tendonfmu.estimate.core_runs import CoreRuns, SlowDrift
 from tendonfmu.estimate.estimation import Estimator
-from tendonfmu.estimate.law_slopes import LawSlopes
-from tendonfmu.estimate.slow_drift import SlowDrift
+from tendonfmu.estimate.memory_fit import LawSlopes
 from tendonfmu.estimate.structure import Choice, build_structure
 from tendonfmu.model import finger_from_data
 from tendonfmu.recordings import Held, prepare

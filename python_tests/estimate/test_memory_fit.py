@@ -15,8 +15,8 @@ from fit_data import make_recording, wavy_forces, wavy_motion
 from fit_finger import moved_start
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.fitting import FrictionFit
+from tendonfmu.estimate.learning import posterior_factor
 from tendonfmu.estimate.memory_choice import choose_memory
-from tendonfmu.estimate.prior import posterior_factor
 from tendonfmu.estimate.structure import Choice, get_number
 from tendonfmu.model import finger_from_data, moment_arms
 from tendonfmu.recordings import FitRecording, Held, Recording, best_angles, prepare

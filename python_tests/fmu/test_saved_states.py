@@ -259,7 +259,7 @@ def test_blocks_of_another_fmu_are_neither_read_nor_written(small: UnpackedFmu, 
 @pytest.mark.parametrize("state", "ims")
 def test_states_of_another_rig_of_the_same_size_are_refused(plant_fmu: UnpackedFmu, state: str, tmp_path: Path) -> None:
     """Also before the finger has settled, when they hold nothing of it."""
-    from tendonfmu.simulate.fmu_packaging import build_plant_fmu
+    from tendonfmu.simulate.ssp import build_plant_fmu
 
     (tmp_path / "rig.json").write_text(json.dumps(fmu_rig(seed=SEED + 1)))
     another = unpack(build_plant_fmu(tmp_path / "rig.json", tmp_path / "another.fmu"), tmp_path / "another")
@@ -327,7 +327,7 @@ def test_the_bound_on_restored_runs_of_the_index_finger(index_plant: UnpackedFmu
 
 @pytest.fixture(scope="module")
 def index_plant(tmp_path_factory: pytest.TempPathFactory) -> UnpackedFmu:
-    from tendonfmu.simulate.fmu_packaging import build_plant_fmu
+    from tendonfmu.simulate.ssp import build_plant_fmu
 
     folder = tmp_path_factory.mktemp("index")
     return unpack(build_plant_fmu(ROOT / "examples/rigs/index_finger.json", folder / "index.fmu"), folder / "unpacked")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tendonfmu.recordings.smoothing import zero_phase
+from tendonfmu.recordings.signal_noise import zero_phase
 
 RATE = 1000.0
 

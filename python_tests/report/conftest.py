@@ -14,8 +14,8 @@ import diagnosis_examples as examples
 import worn_finger
 from fmu_binary import FINGER
 from tendonfmu.diagnosis.result import Diagnosis
+from tendonfmu.estimate.fit_report import FitPicture
 from tendonfmu.estimate.fitting import FrictionFit
-from tendonfmu.estimate.picture import FitPicture
 from tendonfmu.files.tables import write_table
 from tendonfmu.report.run_page import run_report
 

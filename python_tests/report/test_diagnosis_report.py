@@ -12,10 +12,8 @@ import jsonschema
 import pytest
 
 import diagnosis_examples as examples
-from tendonfmu.diagnosis.cause import CausePlace
-from tendonfmu.diagnosis.names import title_of
-from tendonfmu.diagnosis.reported import reported_causes
-from tendonfmu.diagnosis.result import Diagnosis, ModelErrors
+from tendonfmu.diagnosis.names import reported_causes, title_of
+from tendonfmu.diagnosis.result import CausePlace, Diagnosis, ModelErrors
 from tendonfmu.diagnosis.sizes import size_of
 from tendonfmu.files import report_text
 from tendonfmu.report.diagnosis_files import build_report

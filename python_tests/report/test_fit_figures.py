@@ -10,7 +10,7 @@ import pytest
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.drawing import Panel
-from tendonfmu.estimate.picture import CONFIDENCE, FitPicture, LawBands
+from tendonfmu.estimate.fit_report import CONFIDENCE, FitPicture, LawBands
 from tendonfmu.model import finger_from_data, native
 from tendonfmu.model.friction_places import Effect, effects
 from tendonfmu.report.fit_figures import (

@@ -16,11 +16,10 @@ import pytest
 import diagnosis_examples as examples
 from real_browser import Elements, figures_of, measure, needs_nothing_else
 from repetitions import repeated
-from tendonfmu.diagnosis.cause import Where
-from tendonfmu.diagnosis.names import title_of
-from tendonfmu.diagnosis.reported import reported_causes
+from tendonfmu.diagnosis.effects import Where
+from tendonfmu.diagnosis.names import reported_causes, title_of
 from tendonfmu.diagnosis.result import Diagnosis, RemainderMap
-from tendonfmu.estimate.picture import FitPicture
+from tendonfmu.estimate.fit_report import FitPicture
 from tendonfmu.report.diagnosis_page import diagnosis_page, waterfall_of
 from tendonfmu.report.diagnosis_text import names_of
 from tendonfmu.report.fit_page import fit_page

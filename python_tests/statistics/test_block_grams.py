@@ -12,8 +12,7 @@ from scipy.optimize import lsq_linear
 from made_columns import BLOCKS, JOINTS, STEP, coloured, grams_of, series_with, waves
 from synthetic_series import bias_splines
 from tendonfmu.statistics.block_grams import MEMORY, Grams, Products, bounded, standard_error
-from tendonfmu.statistics.blocks import make_folds
-from tendonfmu.statistics.splines import basis, without
+from tendonfmu.statistics.blocks import basis, make_folds, without
 
 Numbers = NDArray[np.float64]
 

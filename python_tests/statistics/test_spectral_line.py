@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tendonfmu.statistics.blocks import BlockSeries
-from tendonfmu.statistics.spectral_line import find_lines
+from tendonfmu.statistics.whitening import find_lines
 
 
 @pytest.mark.parametrize(("rate", "frequency"), [(100.0, 12.0), (30.0, 7.0)])

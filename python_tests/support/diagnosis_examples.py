@@ -13,17 +13,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.diagnosis.cause import Cause, CausePlace, ChangedSize, Evidence, Where
 from tendonfmu.diagnosis.result import (
+    Cause,
+    CausePlace,
+    ChangedSize,
     DetectionGain,
     Diagnosis,
     Event,
+    Evidence,
     Experiment,
     Invisible,
     ModelErrors,
     ResidualView,
     SteadyLoad,
     Unexplained,
+    Where,
 )
 from tendonfmu.statistics.intervals import Interval
 

@@ -13,8 +13,8 @@ from scipy.signal import lfilter
 from synthetic_series import bias_splines
 from tendonfmu.diagnosis.candidate_columns import CandidateColumns, Proposal
 from tendonfmu.diagnosis.effects import Column, Place, Variant, by_name
-from tendonfmu.diagnosis.least_sizes import LeastSizes
-from tendonfmu.diagnosis.series import Series
+from tendonfmu.diagnosis.samples import Series
+from tendonfmu.diagnosis.selection import LeastSizes
 from tendonfmu.statistics.block_grams import Grams, Products
 from tendonfmu.statistics.blocks import make_folds
 
@@ -24,7 +24,7 @@ Array = NDArray[Any]
 STEP = 0.01  # s
 BLOCKS = 3200
 JOINTS = 2
-UNSEEN = LeastSizes(np.zeros(JOINTS), np.zeros(4), STEP, 0.0)  # of sensors that resolve everything but a delay
+UNSEEN = LeastSizes(np.zeros(JOINTS), np.zeros(4), STEP)  # of sensors that resolve everything but a delay
 
 
 def waves(rng: np.random.Generator, count: int, slowest: float = 0.1, fastest: float = 3.0) -> Numbers:

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.signal import lfilter
 
-from tendonfmu.diagnosis.series import Series
-from tendonfmu.statistics.blocks import BlockSeries
-from tendonfmu.statistics.splines import basis, spline_basis, without
+from tendonfmu.diagnosis.samples import Series
+from tendonfmu.statistics.blocks import BlockSeries, basis, spline_basis, without
 
 Numbers = NDArray[np.float64]
 

@@ -24,17 +24,21 @@ from time import perf_counter
 from typing import Any
 
 from tendonfmu.arrays import Data
-from tendonfmu.calibration.delivered import Delivered, Judged, compared, typical_motion, without_held_out
 from tendonfmu.calibration.fit import CalibratedFit, earlier_finger, fit_again, fit_all, stretches_for_diagnosis
 from tendonfmu.calibration.report import (
     OF_PUSH,
     OF_SCORE,
+    Delivered,
+    Judged,
+    compared,
     left_out,
     record_next,
     recording_of,
     structure_of,
     tuning_of,
+    typical_motion,
     typical_push,
+    without_held_out,
 )
 from tendonfmu.detect import ContactTuning, TuneWarning, require_no_contact, score_recordings
 from tendonfmu.detect import score_report as detect_score_report
@@ -98,16 +102,6 @@ class Calibration:
     folder: Path  # of its steps and the diagnosis
 
 
-def _of_alarms(options: CalibrateOptions) -> dict[str, float]:
-    """Return the options that affect the thresholds only."""
-    return {"false_alarms_per_hour": options.false_alarms_per_hour}
-
-
-def _of_all(options: CalibrateOptions) -> dict[str, int]:
-    """Return the options that affect all results."""
-    return {"kinematics": options.kinematics, "seed": options.seed}
-
-
 def calibrate(
     finger: Path | str,
     free: Sequence[Path | str],
@@ -119,41 +113,9 @@ def calibrate(
     options: CalibrateOptions = USUAL,
     progress: Callable[[PhaseState], None] | None = None,
 ) -> Calibration:
-    """Calibrate a finger on free motion.
-
-    Parameters
-    ----------
-    finger
-        Description; its structure is kept, and extended by the causes that a diagnosis finds.
-    free
-        Recordings of free motion.
-    folder
-        Folder for the results of the steps and the page of the diagnosis.
-    tests
-        Free motion to measure the errors on. Without it, that is every fifth stretch of 10 s of `free`, which is then
-        used for nothing else.
-    pushes
-        Recordings with labelled contact, to count what is found.
-    previous
-        Description or fit report of an earlier calibration, for little data: its structure stays, and its numbers are
-        the prior.
-    options
-        Further options.
-    progress
-        Called with the state of the computation.
-
-    Returns
-    -------
-    Calibration
-        Description and report.
-
-    Raises
-    ------
-    InputError
-        A file or an option does not allow a calibration.
-    KeyboardInterrupt
-        Says which steps are done and kept in the folder.
-    """
+    """Calibrate a finger on free motion; results of the steps and the page of the diagnosis go to the folder."""
+    # Without `tests`, every fifth stretch of 10 s of `free` is measured on and used for nothing else. `previous`, for
+    # little data: its structure stays, and its numbers are the prior. After Ctrl-C the steps that are done are kept.
     begun = perf_counter()
     phases = Phases(PHASES, progress or (lambda state: None))
     with phases.start("reading"):
@@ -254,7 +216,9 @@ class _Run:
 
     def __init__(self, case: _Case, folder: Path, options: CalibrateOptions, phases: Phases) -> None:
         self._case, self._folder, self._options, self._phases = case, folder, options, phases
-        self._steps = Steps(folder, {**case.made_from, **_of_all(options)})
+        self._of_all = {"kinematics": options.kinematics, "seed": options.seed}  # options that affect all results
+        self._of_alarms = {"false_alarms_per_hour": options.false_alarms_per_hour}  # and the thresholds only
+        self._steps = Steps(folder, {**case.made_from, **self._of_all})
         self._seconds: dict[str, float] = {}
         self.diagnosed: Diagnosis | None = None
         self.push: PushShown | None = None
@@ -269,9 +233,7 @@ class _Run:
         else:
             lacks = NOTHING_ASKED
             fitted = self._step("all its numbers", "refit", {}, lambda step: self._refit())
-        tuned = self._step(
-            "thresholds of contact", "tune", _of_alarms(self._options), lambda step: self._tune(fitted, step)
-        )
+        tuned = self._step("thresholds of contact", "tune", self._of_alarms, lambda step: self._tune(fitted, step))
         before, after = (Delivered(data, case.judged) for data in (case.finger.data, tuned["finger"]))
         error = compared(before, after, case.judged, "previous" if case.previous else "as_given")
         pushed = None
@@ -301,7 +263,7 @@ class _Run:
                 *tuned["warnings"],
                 *([] if pushed is None else pushed["warnings"]),
             ],
-            "options": {**_of_all(self._options), **_of_alarms(self._options)},
+            "options": {**self._of_all, **self._of_alarms},
             "steps": {"seconds": self._seconds, "repeated": steps.repeated},
         }
         return report, tuned["finger"], typical_motion(before, after, case.judged)
@@ -352,11 +314,9 @@ class _Run:
         """Fit the extended description to all recordings, and to four fifths of them."""
         case, options = self._case, self._options
 
-        def fitted(data: Data, recordings: Sequence[FitRecording]) -> CalibratedFit:
-            return fit_all(described(case.finger, data), recordings, threads=options.jobs, seed=options.seed)
-
-        whole = fitted(lacks["extended"], case.free)
-        most = fitted(whole.data, self._most())
+        settings: dict[str, int] = {"threads": options.jobs, "seed": options.seed}
+        whole = fit_all(described(case.finger, lacks["extended"]), case.free, **settings)
+        most = fit_all(described(case.finger, whole.data), self._most(), **settings)
         return {"finger": whole.data, "most": most.data, "warnings": [*whole.warnings, *left_out(whole.events)]}
 
     def _refit(self) -> dict[str, Any]:
@@ -412,19 +372,15 @@ class _Run:
             file, self._case.pushes, options, progress=lambda done, total: step(done / max(total, 1))
         )
         report = detect_score_report.build_report(scored)
+
+        def of(key: str) -> list[tuple[str, dict[str, Any]]]:
+            return [(Path(each["path"]).name, row) for each in report["recordings"] for row in each[key]]
+
         return {
             **{key: report[key] for key in OF_SCORE},
             "sizes": detect_score_report.by_size(scored, left),
-            "list": [
-                {"recording": Path(each["path"]).name, **{key: event[key] for key in OF_PUSH}}
-                for each in report["recordings"]
-                for event in each["event_list"]
-            ],
-            "false_alarm_list": [
-                {"recording": Path(each["path"]).name, **alarm}
-                for each in report["recordings"]
-                for alarm in each["false_alarm_list"]
-            ],
+            "list": [{"recording": name, **{key: event[key] for key in OF_PUSH}} for name, event in of("event_list")],
+            "false_alarm_list": [{"recording": name, **alarm} for name, alarm in of("false_alarm_list")],
             "warnings": list(scored.warnings),
             "example": typical_push(scored),
         }

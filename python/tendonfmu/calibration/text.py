@@ -37,10 +37,7 @@ _WHAT = {
     REPORT: "the numbers of the page",
 }
 _DIAGNOSED = {f"{DIAGNOSIS}/diagnosis.html": "what the description lacked, and how it was found"}
-MODELS = {
-    "as_given": "the description as given",
-    "previous": "the earlier calibration",
-}
+MODELS = {"as_given": "the description as given", "previous": "the earlier calibration"}
 WORSE = 1.05  # times the error before, from which on the error at a joint counts as larger
 
 
@@ -289,11 +286,7 @@ def tables(report: Report) -> Iterator[Table]:
     """Yield the tables."""
     yield "error, before → calibrated, in mN·m", error_headings(report), error_rows(report)
     if report["structure"]["causes"]:
-        yield (
-            "built into the model",
-            ("cause", "place", "size", "gain on unseen data"),
-            cause_rows(report),
-        )
+        yield "built into the model", ("cause", "place", "size", "gain on unseen data"), cause_rows(report)
     yield "pushes found, nine of ten", ("joint", "from mN·m"), torque_rows(report)
     if sizes := size_rows(report):
         yield "pushes found, by size relative to the error in free motion", ("size", "found", "95 % interval"), sizes

@@ -1,7 +1,7 @@
 """Tunes contact detection on free motion, and scores it on labelled recordings (`tendonfmu tune`, `score`).
 
-`free_motion` prepares free motion, `terms` runs a finger over it, `learning` chooses the bounds from that, and `tuning`
-does both for a stated rate of false alarms. `scoring` and `counting` compare decisions with labels; `summary` and
+`free_motion` prepares free motion, `learning` runs a finger over it and chooses the bounds from that, and `tuning` does
+both for a stated rate of false alarms. `scoring` and `counting` compare decisions with labels; `summary` and
 `score_report` report the result.
 """
 
@@ -12,9 +12,8 @@ from tendonfmu.lazy_exports import lazy_exports
 if TYPE_CHECKING:
     from . import score_report, tune_report
     from .counting import GRACE, DetectionScore, Event, pooled, sample_seconds, score_detection, stretches
-    from .free_motion import SETTLING, free_parts
-    from .pretension import pretension_of
-    from .reference_sensor import require_no_contact
+    from .free_motion import SETTLING, free_parts, require_no_contact
+    from .noise import pretension_of
     from .scoring import Scored, Subject, Track, run_track, score_recordings
     from .summary import RocPoint, Summary
     from .tuning import ContactTuning, NotEnough, TuneWarning

@@ -131,8 +131,7 @@ class DetectionScore:
 
 
 def score_detection(time: Numbers, label: Flags, alarm: Flags, signals: Signals | None = None) -> DetectionScore:
-    """Score one recording."""
-    # time: [N] (s); label, alarm: [N]
+    """Score one recording. time: [N] (s); label, alarm: [N]."""
     time = np.asarray(time, dtype=float)
     label, alarm = (np.asarray(flags).ravel().astype(bool) for flags in (label, alarm))
     given = signals or Signals()

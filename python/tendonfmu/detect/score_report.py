@@ -17,14 +17,8 @@ from tendonfmu.recordings import LABEL
 from tendonfmu.statistics import Interval, intervals
 
 FORMAT = "tendonfmu-score-1"
-
-
-SIZES = (
-    1.5,
-    3.0,
-    6.0,
-    math.inf,
-)  # of pushes: times the rms of the joint's residual, at the joint with the largest ratio
+# of pushes: times the rms of the joint's residual, at the joint with the largest ratio
+SIZES = (1.5, 3.0, 6.0, math.inf)
 
 
 def build_report(scored: Scored) -> dict[str, Any]:

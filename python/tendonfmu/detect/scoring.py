@@ -15,31 +15,15 @@ from numpy.typing import NDArray
 
 from tendonfmu.arrays import Data, Flags, Numbers
 from tendonfmu.detect.counting import DetectionScore, Signals, pooled, score_detection
-from tendonfmu.detect.reference_sensor import sensed_contact
+from tendonfmu.detect.free_motion import sensed_contact
 from tendonfmu.detect.summary import FACTORS, RocPoint, Summary, roc, summarise
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import check_given_once
 from tendonfmu.files import counted
 from tendonfmu.fmu import check_model, outputs_of, run_fmu
-from tendonfmu.model import (
-    Finger,
-    FingerSource,
-    finger_file,
-    inputs_used,
-    native,
-    read_finger,
-    watches_motors,
-)
+from tendonfmu.model import Finger, FingerSource, finger_file, inputs_used, native, read_finger, watches_motors
 from tendonfmu.options import ScoreOptions
-from tendonfmu.recordings import (
-    GROUP_PER,
-    LABEL,
-    Recording,
-    RecordingSource,
-    gaps,
-    listed_sources,
-    read_recordings,
-)
+from tendonfmu.recordings import GROUP_PER, LABEL, Recording, RecordingSource, gaps, listed_sources, read_recordings
 
 Progress = Callable[[int, int], None]
 

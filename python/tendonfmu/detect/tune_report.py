@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tendonfmu.detect.pushes import SURE, WITHIN
-from tendonfmu.detect.tuning import ContactTuning
+from tendonfmu.detect.tuning import SURE, WITHIN, ContactTuning
 from tendonfmu.files import finite
 from tendonfmu.statistics import intervals
 

@@ -1,12 +1,12 @@
 """Find what a model gets wrong, which cause it has, and what correcting it gains (`tendonfmu diagnose`).
 
 - `inputs` reads and checks recordings; `base` settles delay, position-dependent torque and memory.
-- `samples` is what runs of the core are compared with, `series` its signals; `view` turns both into columns.
-- `cause` is what the search names, from the candidate that is tried to the page.
-- `selection` judges candidates, `calibration` all corrections of sensors together; `search` adds what a description
-  lacks, `change_search` what has changed since a reference.
-- `extension_fit` fits the extended finger; `gain` and `cause_gains` measure on unseen data.
-- `extension_diagnosis` and `change_diagnosis` report; `diagnosis` begins.
+- `samples` is what runs of the core are compared with, and its signals; `view` turns both into columns.
+- `result` holds what the search names, from the candidate that is tried to the page.
+- `selection` judges candidates; `search` judges all corrections of sensors together and adds what a description
+  lacks, `change_search` finds what has changed since a reference.
+- `extension_fit` fits the extended finger; `gain` measures on unseen data.
+- `extension_diagnosis` and `change_diagnosis` confirm and report; `diagnosis` begins.
 - `experiments` finds what to record next; `effects` holds the table of effects.
 """
 
@@ -15,17 +15,28 @@ from typing import TYPE_CHECKING
 from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from .cause import Cause, CausePlace, ChangedSize, Evidence, Sensor, Where
     from .contact_scan import events_of, without_events
     from .diagnosis import diagnose
+    from .effects.candidate import Where
     from .effects.places import thresholds
     from .effects.words import NBSP, quantity
-    from .experiments.discrimination import discriminating_motion
+    from .experiments.motion import discriminating_motion
     from .extension_fit import FitSettings, with_known
     from .history import History, Line, diagnose_history, share_of
-    from .names import CONTACT, UNKNOWN, ZERO, Names, at_place, names_in, numbered, title_of
-    from .reported import reported_causes
-    from .result import DetectionGain, Diagnosis, Event, Experiment, Invisible, ResidualView
+    from .names import CONTACT, UNKNOWN, ZERO, Names, at_place, names_in, numbered, reported_causes, title_of
+    from .result import (
+        Cause,
+        CausePlace,
+        ChangedSize,
+        DetectionGain,
+        Diagnosis,
+        Event,
+        Evidence,
+        Experiment,
+        Invisible,
+        ResidualView,
+        Sensor,
+    )
     from .samples import Samples
     from .sizes import size_at
 

@@ -3,22 +3,243 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from tendonfmu.arrays import Numbers
-from tendonfmu.diagnosis.cause import Cause, CausePlace, Key
-from tendonfmu.diagnosis.effects import Place
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import welch
+
+from tendonfmu.arrays import Flags, Numbers
+from tendonfmu.diagnosis.effects import BY_NAME, Place, Where
 from tendonfmu.diagnosis.extension_fit import FitSettings
 from tendonfmu.diagnosis.gain import Gain
 from tendonfmu.diagnosis.inputs import Input
-from tendonfmu.diagnosis.pictures import Compared, evidence, residual_views, whiteness
-from tendonfmu.diagnosis.result import Diagnosis, Unexplained
+from tendonfmu.diagnosis.result import Cause, CausePlace, Diagnosis, Evidence, ResidualView, Unexplained
+from tendonfmu.diagnosis.samples import Series
 from tendonfmu.diagnosis.selection import SIGNIFICANCE
-from tendonfmu.diagnosis.series import Series
-from tendonfmu.statistics import Interval
+from tendonfmu.statistics import Interval, make_folds
 from tendonfmu.tasks import Phases
+
+# --- how the residual looks -------------------------------------------------------------------------------------------
+# From all sides is over time, angle, velocity, force, load and travel, and as spectrum and autocorrelation.
+
+
+BINS = 24
+SHOWN = 4.0  # ratio of the bins' squared means without and with the cause, for a picture that shows it
+FEWEST = 10  # blocks in a bin
+POINTS = 1200  # of a curve over time
+LONGEST_LAG = 1.0  # s
+
+
+# --- a cause ----------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Compared:
+    """What a model leaves without and with a cause, N·m [B, n]."""
+
+    series: Series
+    before: Numbers
+    after: Numbers
+    added: Numbers  # torque of the cause
+    judged: Flags  # blocks that are looked at [B]
+    reference: Flags | None = None  # blocks of the reference [B], for a change
+
+
+def evidence(effect: str, places: Sequence[Place], compared: Compared) -> tuple[Evidence, ...]:
+    """Return a picture of the residual at the joint where the cause changes most."""
+    joint = int(np.argmax(np.sum(compared.added[compared.judged] ** 2, axis=0)))
+    place = next((place for place in places if place.joint == joint + 1), places[0])
+    coordinate = BY_NAME[effect].coordinate if effect in BY_NAME else "velocity"
+    picture = _binned_evidence(compared, _coordinate_of(place, coordinate, compared.series, joint), joint)
+    if picture and _shows(picture[0]):
+        return picture
+    what = "cause" if compared.reference is None else "change"
+    torque = (f"torque of this {what} at joint {joint + 1}", "N·m", compared.added[:, joint])
+    return _binned_evidence(compared, torque, joint) or picture
+
+
+def _shows(evidence: Evidence) -> bool:
+    """Return whether the cause removes most of the bins' mean residual."""
+    return float(np.sum(evidence.before**2)) >= SHOWN * float(np.sum(evidence.after**2))
+
+
+def _binned_evidence(compared: Compared, over: tuple[str, str, Numbers], joint: int) -> tuple[Evidence, ...]:
+    """Average over bins of equal count; return nothing if there are too few blocks."""
+    label, unit, values = over
+    kept = compared.judged & np.isfinite(values)
+    bins = min(BINS, int(kept.sum()) // FEWEST)
+    if bins < 2:
+        return ()
+    before, after = compared.before[:, joint], compared.after[:, joint]
+    reference: tuple[Numbers, Numbers] | tuple[None, None] = (None, None)
+    if compared.reference is None:
+        order = np.flatnonzero(kept)[np.argsort(values[kept], kind="stable")]
+        parts = np.array_split(order, bins)
+    else:
+        edges = np.quantile(values[kept], np.linspace(0.0, 1.0, bins + 1))
+        inside = compared.reference & (values >= edges[0]) & (values <= edges[-1])
+        edges[0], edges[-1] = -np.inf, np.inf
+        member = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, bins - 1)
+        filled = [k for k in range(bins) if (kept & (member == k)).any()]
+        parts = [np.flatnonzero(kept & (member == k)) for k in filled]
+        reference = _means(after, [np.flatnonzero(inside & (member == k)) for k in filled], compared.series)
+    least = 1 if compared.reference is None else FEWEST
+    means = [_means(torque, parts, compared.series, least) for torque in (before, after)]
+    coordinate = np.array([values[rows].mean() for rows in parts])
+    (before, before_std), (after, after_std) = means
+    return (Evidence(joint + 1, label, unit, coordinate, before, after, before_std, after_std, *reference),)
+
+
+def _means(
+    values: Numbers, parts: Sequence[NDArray[np.int64]], series: Series, least: int = FEWEST
+) -> tuple[Numbers, Numbers]:
+    """Return means and their standard errors [K]; NaN for bins with fewer than `least` blocks."""
+    means, errors = np.full(len(parts), np.nan), np.full(len(parts), np.nan)
+    second = np.floor(series.time).astype(np.int64) + 1_000_000 * series.recording
+    for k, rows in enumerate(parts):
+        if len(rows) >= least:
+            means[k] = values[rows].mean()
+            _, member = np.unique(second[rows], return_inverse=True)
+            sums = np.bincount(member, weights=values[rows] - means[k])
+            errors[k] = np.sqrt(np.sum(sums**2)) / len(rows)
+    return means, errors
+
+
+def _coordinate_of(place: Place, kind: str, series: Series, joint: int) -> tuple[str, str, Numbers]:
+    """Return label, unit and values [B] of the coordinate."""
+    own = joint if place.joint is None else place.joint - 1
+    tendon = None if place.tendon is None else place.tendon - 1
+    if kind == "velocity" and tendon is not None:
+        return f"velocity of tendon {tendon + 1}", "m/s", series.tendon_velocity[:, tendon, own]
+    if kind in ("force", "load"):
+        if tendon is None:
+            return "mean tendon force", "N", np.abs(series.force).mean(axis=1)
+        return f"force of tendon {tendon + 1}", "N", series.force[:, tendon]
+    of_joint: Mapping[str, tuple[str, str, Numbers]] = {
+        "velocity": ("velocity", "rad/s", series.velocity),
+        "angle": ("angle", "rad", series.angle),
+        "travel": ("travel since the last reversal", "rad", np.asarray(series.travel * np.sign(series.velocity))),
+        "acceleration": ("acceleration", "rad/s²", series.acceleration),
+    }
+    if kind in of_joint:
+        label, unit, values = of_joint[kind]
+        return f"{label} of joint {own + 1}", unit, values[:, own]
+    return "time", "s", series.time
+
+
+# --- all sides --------------------------------------------------------------------------------------------------------
+
+
+def residual_views(
+    series: Series, before: Numbers, after: Numbers, *, load: Numbers | None = None
+) -> tuple[ResidualView, ...]:
+    """Return all pictures of the residual, joint after joint. before, after: [B, n]; load: [B, n]."""
+    return tuple(view for joint in range(before.shape[1]) for view in _of_joint(series, before, after, load, joint))
+
+
+def _of_joint(
+    series: Series, before: Numbers, after: Numbers, load: Numbers | None, joint: int
+) -> Iterator[ResidualView]:
+    used = series.used
+    pair = before[used, joint], after[used, joint]
+    yield _over_time(series, before[:, joint], after[:, joint], joint)
+    yield _binned("angle", f"angle of joint {joint + 1}", "rad", series.angle[used, joint], *pair, joint)
+    yield _binned("velocity", f"velocity of joint {joint + 1}", "rad/s", series.velocity[used, joint], *pair, joint)
+    yield _binned("tendon_force", "mean tendon force", "N", np.abs(series.force[used]).mean(axis=1), *pair, joint)
+    if load is not None:
+        yield _binned("load", f"torque at joint {joint + 1}", "N·m", load[used, joint], *pair, joint)
+    turned = series.travel[used, joint] * np.sign(series.velocity[used, joint])
+    yield _binned("travel", "travel since reversal, with its direction", "rad", turned, *pair, joint)
+    yield _spectrum(series, before[:, joint], after[:, joint], joint)
+    yield _autocorrelation(series, before[:, joint], after[:, joint], joint)
+
+
+def _over_time(series: Series, before: Numbers, after: Numbers, joint: int) -> ResidualView:
+    """Average over equal pieces, recordings one after another; NaN between them and where nothing is used."""
+    size = max(1, -(-len(before) // POINTS))
+    pieces = -(-len(before) // size)
+    piece = np.arange(len(before)) // size
+    used = series.used
+    count = np.bincount(piece[used], minlength=pieces)
+
+    def mean(values: Numbers) -> Numbers:
+        total = np.bincount(piece[used], values[used], minlength=pieces)
+        return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+    clock = _running_time(series)
+    return ResidualView(joint + 1, "time", "time", "s", clock[np.arange(pieces) * size], mean(before), mean(after))
+
+
+def _running_time(series: Series) -> Numbers:
+    """Return the time of each block; every recording starts where the one before ended."""
+    new = np.flatnonzero(np.diff(series.recording, prepend=series.recording[:1] - 1))
+    ends = np.append(new[1:], len(series.time)) - 1
+    lengths = series.time[ends] - series.time[new] + series.step
+    begin = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])
+    which = np.searchsorted(new, np.arange(len(series.time)), side="right") - 1
+    return np.asarray(series.time - series.time[new][which] + begin[which])
+
+
+def _binned(kind: str, label: str, unit: str, x: Numbers, before: Numbers, after: Numbers, joint: int) -> ResidualView:
+    """Average over bins of equal count; `before_std` is the scatter within the bin."""
+    order = np.argsort(x, kind="stable")
+    parts = [part for part in np.array_split(order, BINS) if len(part)]
+
+    def mean(values: Numbers) -> Numbers:
+        return np.array([values[part].mean() for part in parts])
+
+    scatter = np.array([before[part].std() for part in parts])
+    return ResidualView(joint + 1, kind, label, unit, mean(x), mean(before), mean(after), scatter)
+
+
+def _spectrum(series: Series, before: Numbers, after: Numbers, joint: int) -> ResidualView:
+    """Return Welch's power density, N²m²/Hz; runs without a gap are averaged by their length."""
+    rate, plan = 1.0 / series.step, make_folds(series)
+    ends = np.flatnonzero(np.diff(plan.run, append=-1)) + 1
+    runs = [plan.rows[begin:end] for begin, end in zip(np.append(0, ends[:-1]), ends, strict=True)]
+    size = min(512, max((len(run) for run in runs), default=1))
+    total, weight = np.zeros((2, size // 2 + 1)), 0.0
+    for run in runs:
+        if len(run) >= size:
+            density = welch(np.stack([before[run], after[run]]), rate, nperseg=size)[1]
+            total += density * len(run)
+            weight += len(run)
+    frequency = np.arange(size // 2 + 1, dtype=np.float64) / (size * series.step)
+    total /= max(weight, 1.0)
+    return ResidualView(joint + 1, "spectrum", "frequency", "Hz", frequency[1:], total[0, 1:], total[1, 1:])
+
+
+def _autocorrelation(series: Series, before: Numbers, after: Numbers, joint: int) -> ResidualView:
+    lags = np.arange(1, max(2, round(LONGEST_LAG / series.step)) + 1)
+    curves = [_correlations(series, values, lags) for values in (before, after)]
+    return ResidualView(joint + 1, "autocorrelation", "lag", "s", np.asarray(lags * series.step), curves[0], curves[1])
+
+
+def _correlations(series: Series, values: Numbers, lags: NDArray[np.int64]) -> Numbers:
+    """Return the correlation of values [B] with themselves a few blocks later, without pairs across a gap."""
+    plan = make_folds(series)
+    seen = values[plan.rows] - (values[plan.rows].mean() if len(plan.rows) else 0.0)
+    variance = float(np.mean(seen**2)) if len(seen) else 0.0
+    correlations = []
+    for lag in lags:
+        same = plan.run[lag:] == plan.run[:-lag]
+        count = int(same.sum())
+        mean = float(np.sum((seen[lag:] * seen[:-lag])[same])) / count if count else 0.0
+        correlations.append(mean / variance if variance > 0.0 else 0.0)
+    return np.array(correlations)
+
+
+def whiteness(series: Series, before: Numbers, after: Numbers) -> tuple[tuple[float, float], ...]:
+    """Return, for each joint, the correlation of neighbouring blocks before and after; 0 for white noise."""
+    one = np.array([1])
+    return tuple(
+        (float(_correlations(series, before[:, j], one)[0]), float(_correlations(series, after[:, j], one)[0]))
+        for j in range(before.shape[1])
+    )
+
 
 MOST_LONGER = 10.0  # times the duration: beyond, another motion is the better advice
 MARGIN = 1.2  # times the duration at which the interval would just end at 0
@@ -91,7 +312,7 @@ def reported(cause: Cause, compared: Compared) -> Cause:
     )
 
 
-def not_taken(causes: Iterable[Cause], experiments: Mapping[Key, str], seconds: float) -> dict[str, Any]:
+def not_taken(causes: Iterable[Cause], experiments: Mapping[Where, str], seconds: float) -> dict[str, Any]:
     """Divide causes that are significant but were not taken into those that are too small and the uncertain ones."""
     # `experiments` names those planned; `seconds` of unseen motion were judged
     small, uncertain = list[Cause](), list[Cause]()
@@ -100,7 +321,7 @@ def not_taken(causes: Iterable[Cause], experiments: Mapping[Key, str], seconds: 
         if cause.gain.low > 0.0 or cause.p_value >= SIGNIFICANCE:
             small.append(cause)
         else:
-            settling = _longer(cause.gain, seconds) or experiments.get(cause.key) or OTHER_MOTION
+            settling = _longer(cause.gain, seconds) or experiments.get(cause.where) or OTHER_MOTION
             uncertain.append(replace(cause, experiment=settling))
     return {"too_small": tuple(small), "uncertain": tuple(uncertain)}
 
@@ -118,4 +339,4 @@ def _places(cause: Cause) -> tuple[CausePlace, ...]:
     """Return the places of the terms of a cause, without numbers; a change is free at all of its places together."""
     if cause.changed is not None or not cause.terms:
         return (CausePlace(cause.joint, cause.tendon, {}),)
-    return tuple(CausePlace(term.place.joint, term.place.tendon, {}) for term in cause.terms)
+    return tuple(CausePlace(*term.place, {}) for term in cause.terms)

@@ -17,12 +17,17 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.arrays import Data, Flags, Numbers
-from tendonfmu.diagnosis.effects import CANDIDATES, Candidate, Place, Term, by_name
-from tendonfmu.diagnosis.effects.memory import memory_of, memory_terms
-from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel, extended_description, fit_numbers
-from tendonfmu.diagnosis.least_sizes import LeastSizes, least_sizes
-from tendonfmu.diagnosis.samples import Samples
-from tendonfmu.diagnosis.selection import Selection
+from tendonfmu.diagnosis.effects import CANDIDATES, Candidate, Place, Term, Where, by_name
+from tendonfmu.diagnosis.extension_fit import (
+    FitSettings,
+    FittedModel,
+    extended_description,
+    fit_numbers,
+    memory_of,
+    memory_terms,
+)
+from tendonfmu.diagnosis.samples import Samples, shifted
+from tendonfmu.diagnosis.selection import LeastSizes, Selection, least_sizes
 from tendonfmu.diagnosis.view import View, look
 from tendonfmu.estimate import choose_memory
 from tendonfmu.model import EFFECT_NUMBERS, Finger, moment_arms
@@ -66,12 +71,7 @@ class Base:
 def refitted(model: FittedModel, samples: Samples, settings: FitSettings, rough: bool = False) -> FittedModel:
     """Fit a model again, at the forces that it predicts."""
     return fit_numbers(
-        model.data,
-        samples.at_predicted_forces(model.data),
-        settings,
-        given=model.given,
-        fixed=model.fixed,
-        rough=rough,
+        model.data, samples.at_predicted_forces(model.data), settings, given=model.given, fixed=model.fixed, rough=rough
     )
 
 
@@ -133,7 +133,7 @@ def _position_dependent(data: Data, samples: Samples, least: LeastSizes, least_g
     view = look(data, samples, least, [by_name(name) for name in POSITION])
     taken: list[Any] = []
     while len(taken) < len(POSITION):
-        selection: Selection = view.beside({cause.key for cause in taken})
+        selection: Selection = view.beside({cause.where for cause in taken})
         best = selection.best(least_gain)
         if best is None:
             break
@@ -184,7 +184,7 @@ def _delay_of_positions(data: Data, samples: Samples, least: LeastSizes) -> tupl
     known = delay_of_positions(data, samples.recordings)
     if known is None or not DELAY.places(data, samples.recordings[0].kinematics):
         return None
-    return _late(known) if abs(known) >= least.least("time_delay", None, None) else ()
+    return _late(known) if abs(known) >= least.least(Where("time_delay")) else ()
 
 
 def _late(delay: float) -> tuple[Term, ...]:
@@ -230,12 +230,4 @@ def delay_of_positions(data: Mapping[str, Any], recordings: Sequence[FitRecordin
 
 def _late_torque(samples: Samples, delay: float) -> Numbers:
     """Return the change of the block means of the target if it is taken `delay` s later, N·m [B, n]."""
-    shifted: list[Numbers] = []
-    for recording in samples.recordings:
-        own = recording.target.copy()
-        for part in recording.parts:
-            time = recording.time[part]
-            for j in range(own.shape[1]):
-                own[part, j] = np.interp(time + delay, time, recording.target[part, j])
-        shifted.append(own - recording.target)
-    return samples.grid.means(shifted)
+    return samples.grid.means([shifted(each, each.target, delay) - each.target for each in samples.recordings])

@@ -15,10 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.arrays import Data, Numbers
-from tendonfmu.diagnosis.effects import CANDIDATES, Candidate, Place, Variant
-from tendonfmu.diagnosis.samples import Samples, with_late_forces
-from tendonfmu.diagnosis.span import Span, span_of
+from tendonfmu.diagnosis.effects import BY_NAME, CANDIDATES, SHARED, Candidate, Place, Term, Variant, Where
+from tendonfmu.diagnosis.extension_fit import structure_of
+from tendonfmu.diagnosis.result import EVERYWHERE, HERE, SOMEWHERE, Cause, Direction
+from tendonfmu.diagnosis.samples import Samples, Span, span_of, with_late_forces
 from tendonfmu.errors import TooLargeError
+from tendonfmu.estimate import SCALING, Estimator, Unknown, own_copy, set_number
+from tendonfmu.model import law_path, native, steps_of
 
 Single = NDArray[np.float32]
 Worth = Callable[[Candidate, Place, Mapping[str, float]], bool]
@@ -54,16 +57,15 @@ def candidate_columns(
     worth: Worth | None = None,
 ) -> CandidateColumns:
     """Compute the columns of all candidates that a description lacks."""
-    plain = without_sensor_fault(data)
     span = span or span_of(data, samples.recordings)
-    proposals = tuple(_proposed(plain, samples.recordings[0].kinematics, span, candidates, worth))
+    proposals = tuple(_proposed(data, samples.recordings[0].kinematics, span, candidates, worth))
     count = proposals[-1].columns.stop if proposals else 0
     joints, blocks = len(data["joints"]), samples.grid.blocks
     _refuse_too_many(blocks * joints * count * 4 / 1e9, count)
     values = np.zeros((blocks, joints, count), dtype=np.float32)
-    base = samples.left(plain)
+    base = samples.left(data)
     for proposal in proposals:
-        for k, column in enumerate(_columns(proposal.variant, plain, samples, base), start=proposal.columns.start):
+        for k, column in enumerate(_columns(proposal.variant, data, samples, base), start=proposal.columns.start):
             values[:, :, k] = column
     return CandidateColumns(values, proposals)
 
@@ -90,13 +92,8 @@ def _refuse_too_many(size: float, columns: int) -> None:
         )
 
 
-def without_sensor_fault(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the description without what asks for more signals than friction does."""
-    return {**data, "contact": {**data["contact"], "watches_motors": None}, "sensor_fault": None}
-
-
 def _proposed(
-    data: Mapping[str, Any], kinematics: int, span: Span, candidates: Sequence[Candidate], worth: Worth | None
+    data: Data, kinematics: int, span: Span, candidates: Sequence[Candidate], worth: Worth | None
 ) -> Iterator[Proposal]:
     first = 0
     for candidate in candidates:
@@ -110,3 +107,250 @@ def _proposed(
 def _is_sane(variant: Variant) -> bool:
     """Return whether a description accepts the variant's numbers; recordings of another scale can lead to any value."""
     return all(abs(value) <= _LARGEST for value in variant.shape.values())
+
+
+# --- from coarse to fine ----------------------------------------------------------------------------------------------
+# A candidate combines columns of single places with one set of magnitudes. One effect at many places is one candidate;
+# a finer one is taken only if it explains materially more. Where recordings are compared with a reference, the numbers
+# that the description has may have changed, too.
+
+
+LARGEST_SCALING = 0.2  # of the tendon's largest arm, or of its force, anywhere in the joint's range
+LARGEST_DRIFT = 5.0  # of the friction: where it is next to 0, any drift is a multiple of it
+LEAST_OF_FAST = 0.3  # least gain of a pulley that turns faster than its joint: any function of the angle resembles it
+LARGEST = 1e3  # times an ordinary size: a column of next to nothing would ask for any
+LARGEST_SECANT = 3.0  # times the step that its column was computed with; the column is not valid beyond
+
+_OF_LAW = {"friction": "joint_friction", "load_friction": "joint_load_friction"}
+_OF_NUMBER = {"viscous": "viscous_friction", "static": "stribeck", "stribeck_velocity": "stribeck"}
+Shares = tuple[Numbers, Numbers, Numbers]  # of numbers in magnitudes [numbers, d]; bounds of the magnitudes [d]
+
+
+def hypotheses(columns: CandidateColumns, arms: Numbers, reach: Numbers) -> list[Cause]:
+    """Return all effects that the description may lack, the coarse ones first."""
+    count = columns.values.shape[2]
+    listed = [_single(proposal, count, arms, reach) for proposal in columns.proposals]
+    for effect in SHARED:
+        by_place: dict[Place, list[Proposal]] = {}
+        for proposal in columns.proposals:
+            if proposal.candidate.name == effect:
+                by_place.setdefault(proposal.place, []).append(proposal)
+        for where, level, places in _groups(effect, list(by_place)):
+            for parts in _alike([by_place[place] for place in places]):
+                listed.append(_together(where, level, parts, count))
+    return sorted(listed, key=lambda cause: cause.direction.level)
+
+
+def _groups(effect: str, places: Sequence[Place]) -> Iterator[tuple[Where, int, list[Place]]]:
+    """Yield all places, and the places of each joint and tendon if these are several but not all."""
+    if len(places) < 2:
+        return
+    groups = {Place(): list(places)}
+    for place in places:
+        if place.joint is not None:
+            groups.setdefault(Place(place.joint), []).append(place)
+        if place.tendon is not None:
+            groups.setdefault(Place(tendon=place.tendon), []).append(place)
+    for group, members in groups.items():
+        whole = group == Place()
+        if len(members) >= 2 and (whole or len(members) < len(places)):
+            yield Where(effect, *group), EVERYWHERE if whole else SOMEWHERE, members
+
+
+# --- effects that the description lacks -------------------------------------------------------------------------------
+
+
+def _single(proposal: Proposal, count: int, arms: Numbers, reach: Numbers) -> Cause:
+    variant, place, name = proposal.variant, proposal.place, proposal.candidate.name
+    mix = np.zeros((count, variant.count))
+    mix[proposal.columns] = np.eye(variant.count)
+    low, high = _signed(variant)
+    if name in SCALING and place.tendon is not None:
+        largest = LARGEST_SCALING * (1.0 if name == "force_gain" else float(np.abs(arms[place.tendon - 1]).max()))
+        if name == "moment_arm_variation" and place.joint is not None:
+            largest /= max(float(reach[place.joint - 1]), 1e-9)
+        low, high = np.maximum(low, -largest), np.minimum(high, largest)
+    if name == "friction_drift":
+        high = np.minimum(high, LARGEST_DRIFT)
+    level = EVERYWHERE if place == Place() else HERE
+    least = LEAST_OF_FAST if variant.shape.get("turns", 1.0) != 1.0 else 0.0
+    direction = Direction(mix, low, high, level, np.array(variant.expected), _step(variant), least)
+    term = Term(proposal.candidate, place, variant.shape, (1.0,) * variant.count)
+    return _cause(Where(name, *place), direction, (term,))
+
+
+def _cause(where: Where, direction: Direction, terms: tuple[Term, ...]) -> Cause:
+    candidate = BY_NAME[where.effect]
+    return Cause(where, candidate.title, candidate.explanation, terms=terms, direction=direction)
+
+
+def _signed(variant: Variant) -> tuple[Numbers, Numbers]:
+    """Return the bounds of the magnitudes [d]."""
+    signs = np.array(variant.signs)
+    most = LARGEST * np.array(variant.expected)
+    low, high = np.where(signs > 0, 0.0, -most), np.where(signs < 0, 0.0, most)
+    return low, np.minimum(high, LARGEST_SECANT) if variant.full is not None else high
+
+
+def _step(variant: Variant) -> float:
+    return abs(float(next(iter(variant.shape.values())))) if variant.full is not None and variant.shape else 1.0
+
+
+def _alike(by_place: Sequence[Sequence[Proposal]]) -> Iterator[list[Proposal]]:
+    """Yield, for each k, the k-th shape of each law at every place, as long as all laws have one."""
+    laws: list[list[Proposal]] = []
+    for proposals in by_place:
+        by_law: dict[tuple[str, ...], list[Proposal]] = {}
+        for proposal in proposals:
+            law = tuple(key for key in ("pulley", "load", "rises") if proposal.variant.shape.get(key))
+            by_law.setdefault(law, []).append(proposal)
+        laws += [same for law, same in by_law.items() if "rises" not in law]
+    if not laws or len({same[0].variant.count for same in laws}) != 1:
+        return
+    for k in range(min(map(len, laws))):
+        yield [same[k] for same in laws]
+
+
+def _together(where: Where, level: int, parts: Sequence[Proposal], count: int) -> Cause:
+    """Combine shapes so that a magnitude of 1 is an ordinary effect at every place."""
+    first = parts[0].variant
+    mix = np.zeros((count, first.count))
+    terms = []
+    for proposal in parts:
+        expected = proposal.variant.expected
+        mix[np.arange(proposal.columns.start, proposal.columns.stop), np.arange(first.count)] = expected
+        terms.append(Term(proposal.candidate, proposal.place, proposal.variant.shape, expected))
+    direction = Direction(mix, *_signed(first), level, np.array(first.expected), _step(first))
+    return _cause(where, direction, tuple(terms))
+
+
+# --- numbers that the description has ---------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Number:
+    """One unknown of a description's fit."""
+
+    effect: str  # name of the effect
+    place: Place
+    side: int  # of its law: 1 or −1; 0 if both sides are one
+    index: int  # among the unknowns
+    path: str
+    value: float  # start and bounds in the unit of the unknown
+    low: float
+    high: float
+
+
+def numbers_of(data: Data) -> list[Number]:
+    """Return the numbers in the order of `extension_fit.number_columns`."""
+    unknowns = [unknown for unknown in estimator_of(data)[0].unknowns if not unknown.path.startswith("bias.")]
+    return [_number(data, k, unknown) for k, unknown in enumerate(unknowns)]
+
+
+def estimator_of(data: Data) -> tuple[Estimator, list[str]]:
+    """Return an estimator of all numbers that a fit estimates, and the paths of the description's parameters."""
+    structure = structure_of(data)
+    paths = [parameter.path for parameter in native.Instance(structure.start.image).parameters()]
+    return Estimator(structure.start.image, structure.group, structure.scale), paths
+
+
+def _number(data: Data, index: int, unknown: Unknown) -> Number:
+    effect, place, side = _owner(data, unknown.path)
+    return Number(effect, place, side, index, unknown.path, unknown.start, unknown.lower, unknown.upper)
+
+
+def _owner(data: Data, path: str) -> tuple[str, Place, int]:
+    """Return effect, place and side of a number."""
+    law = law_path(path)
+    if law is not None and law.number is not None:
+        side = {"positive": 1, "negative": -1}.get(law.side or "", 0)
+        effect = _OF_NUMBER.get(law.number) or _OF_LAW.get(law.kind, law.kind)
+        return effect, Place(law.joint, law.tendon), side
+    owner, index, *key = steps_of(path)
+    if owner == "joints" and key == ["cover", "stiffness"]:
+        return "cover_stiffness", Place(int(index) + 1), 0
+    if owner == "extensions" and len(key) == 1:
+        row = data["extensions"][index]
+        return row["effect"], Place(row.get("joint"), row.get("tendon")), 0
+    return path, Place(), 0
+
+
+def number_hypotheses(numbers: Sequence[Number], count: int, first: int) -> list[Cause]:
+    """Return changes of each effect at each place, of one joint or tendon, and everywhere; the coarse ones first."""
+    # of `count` columns, those of the numbers begin at `first`
+    by_place: dict[tuple[str, Place], list[Number]] = {}
+    for number in numbers:
+        by_place.setdefault((number.effect, number.place), []).append(number)
+    listed = []
+    for (effect, place), members in by_place.items():
+        where, level = Where(effect, *place), EVERYWHERE if place == Place() else HERE
+        if any(member.side for member in members):
+            listed.append(_changed(where, level, *_scaled(members), members, count, first))
+            if effect != "stribeck":
+                apart = Where("asymmetric_friction", *place)
+                listed.append(_changed(apart, level, *_apart(members), members, count, first))
+        else:
+            listed.append(_changed(where, level, *_free(members), members, count, first))
+    for effect in SHARED:
+        of_effect = {place: members for (name, place), members in by_place.items() if name == effect}
+        for where, level, places in _groups(effect, list(of_effect)):
+            members = [number for place in places for number in of_effect[place]]
+            listed.append(_changed(where, level, *_scaled(members), members, count, first))
+    return sorted(listed, key=lambda cause: cause.direction.level)
+
+
+def _free(numbers: Sequence[Number]) -> Shares:
+    """Let each number change by itself: those of working points, or of a term with several numbers."""
+    value, low, high = (np.array([getattr(number, name) for number in numbers]) for name in ("value", "low", "high"))
+    return np.eye(len(numbers)), low - value, high - value
+
+
+def _scaled(numbers: Sequence[Number]) -> Shares:
+    """Let all numbers change by the same share."""
+    _, low, high = _free(numbers)
+    size = np.array([abs(number.value) for number in numbers])
+    size = np.where(size > 0.0, size, size.max(initial=0.0) or 1.0)
+    return size[:, None], np.array([(low / size).max()]), np.array([(high / size).min()])
+
+
+def _apart(numbers: Sequence[Number]) -> Shares:
+    """Let the two sides of a law change against each other."""
+    most = np.array([min(number.value - number.low for number in numbers)])
+    return np.array([[float(number.side)] for number in numbers]), -most, most
+
+
+def _changed(
+    where: Where,
+    level: int,
+    shares: Numbers,
+    low: Numbers,
+    high: Numbers,
+    numbers: Sequence[Number],
+    count: int,
+    first: int,
+) -> Cause:
+    """Return a change of numbers of the description."""
+    mix = np.zeros((count, shares.shape[1]))
+    mix[[first + number.index for number in numbers]] = shares
+    direction = Direction(mix, low, high, level)
+    candidate = BY_NAME.get(where.effect)
+    if candidate is None:
+        return Cause(where, where.effect.replace("_", " "), direction=direction)
+    _, look, at = candidate.explanation.partition("Look ")
+    explanation = f"The description has this effect; its number is different now. {look}{at}".strip()
+    return Cause(where, candidate.title, explanation, direction=direction)
+
+
+def with_numbers(data: Data, added: Numbers) -> dict[str, Any]:
+    """Return the description with `added` [u] added to its unknowns, within their bounds."""
+    estimator, paths = estimator_of(data)
+    z = estimator.start.copy()
+    rows = [k for k, unknown in enumerate(estimator.unknowns) if not unknown.path.startswith("bias.")]
+    z[rows] += added
+    low, high = (np.array([getattr(unknown, end) for unknown in estimator.unknowns]) for end in ("lower", "upper"))
+    before, after = estimator.values(estimator.start), estimator.values(np.clip(z, low, high))
+    result = own_copy(data)
+    for path, one, other in zip(paths, before, after, strict=True):
+        if one != other:
+            set_number(result, path, float(other))
+    return result

@@ -7,29 +7,113 @@ numbers, or a term that it lacks, in the new recordings only.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 from scipy import stats
 
-from tendonfmu.arrays import Data, Numbers
-from tendonfmu.diagnosis.answer import Asked, answered, not_taken, reported
+from tendonfmu.arrays import Data, Flags, Numbers
+from tendonfmu.diagnosis.answer import Asked, Compared, answered, not_taken, reported
 from tendonfmu.diagnosis.base import Base
-from tendonfmu.diagnosis.cause import Cause, ChangedSize, Key
 from tendonfmu.diagnosis.change_search import ChangeSearch, interval_of
 from tendonfmu.diagnosis.contact_scan import event_gain, events_of, unusual, without_events
+from tendonfmu.diagnosis.effects import Where
 from tendonfmu.diagnosis.extension_fit import with_known
 from tendonfmu.diagnosis.gain import Gain, measure_gain
 from tendonfmu.diagnosis.names import names_in
-from tendonfmu.diagnosis.pictures import Compared
-from tendonfmu.diagnosis.result import Diagnosis, Event, Experiment, SteadyLoad, Unexplained
-from tendonfmu.diagnosis.samples import Samples
+from tendonfmu.diagnosis.result import (
+    Cause,
+    ChangedSize,
+    Diagnosis,
+    Event,
+    Experiment,
+    SteadyLoad,
+    Unexplained,
+    with_error,
+)
+from tendonfmu.diagnosis.samples import Samples, Series
 from tendonfmu.diagnosis.selection import SIGNIFICANCE, absorbed_effects, by_gain, confirmed
-from tendonfmu.diagnosis.series import Series
 from tendonfmu.diagnosis.sizes import sized, with_sizes_by_recording
-from tendonfmu.diagnosis.steady_load import steady_load
-from tendonfmu.statistics import Interval
+from tendonfmu.statistics import Interval, gain_interval, make_folds
+
+# --- a steady load ----------------------------------------------------------------------------------------------------
+
+
+BEYOND = 2.0  # times what the reference itself leaves about its level, or the distance between its recordings
+OTHER_SIDE = 0.01  # largest share of stretches whose mean is on the other side
+
+
+def steady_load(series: Series, left: Numbers, is_now: Flags, seed: int = 0) -> SteadyLoad | None:
+    """Return the load at the joint where it is largest; None if no level moved beyond the reference's scatter."""
+    loads = []
+    for joint in range(left.shape[1]):
+        then, now = (_Side.of(series, left[:, joint], series.used & side) for side in (~is_now, is_now))
+        if min(len(then.means), len(now.means)) < 2:
+            continue
+        load = _at(joint, then, now, seed)
+        if load is not None:
+            loads.append(load)
+    best = max(loads, key=lambda load: abs(load.size.change.value), default=None)
+    return best and replace(best, p_value=min(1.0, best.p_value * left.shape[1]))
+
+
+@dataclass(frozen=True)
+class _Side:
+    """The mean torque of one side."""
+
+    level: float  # mean, N·m
+    spread: float  # rms about the level, N·m
+    apart: float  # largest distance of a recording's mean from the level, N·m
+    means: Numbers  # by stretch of 2 s
+    squares: Numbers
+    counts: Numbers
+
+    @staticmethod
+    def of(series: Series, values: Numbers, used: Flags) -> _Side:
+        rows = np.flatnonzero(used)
+        if not len(rows):
+            return _Side(0.0, 0.0, 0.0, np.zeros(0), np.zeros(0), np.zeros(0))
+        own = values[rows]
+        level = float(own.mean())
+        by_recording = [float(own[series.recording[rows] == k].mean()) for k in np.unique(series.recording[rows])]
+        folds = make_folds(replace(series, used=used))
+        counts = np.bincount(folds.stretch, minlength=folds.stretches).astype(np.float64)
+        sums = [np.bincount(folds.stretch, values[folds.rows] ** k, minlength=folds.stretches) for k in (1, 2)]
+        return _Side(
+            level,
+            float(own.std()),
+            max(abs(other - level) for other in by_recording),
+            np.asarray(sums[0] / counts, dtype=np.float64),
+            np.asarray(sums[1], dtype=np.float64),
+            counts,
+        )
+
+    @property
+    def error(self) -> float:
+        """Standard error of the level."""
+        return float(np.std(self.means, ddof=1) / np.sqrt(len(self.means)))
+
+    def about(self, level: float) -> Numbers:
+        """Return Σ (x − level)² by stretch [K]."""
+        return np.asarray(self.squares - 2.0 * level * self.means * self.counts + level**2 * self.counts)
+
+
+def _at(joint: int, then: _Side, now: _Side, seed: int) -> SteadyLoad | None:
+    moved = now.level - then.level
+    if abs(moved) <= BEYOND * max(then.spread, then.apart):
+        return None
+    if float(np.mean(np.sign(now.means - then.level) != np.sign(moved))) > OTHER_SIDE:
+        return None
+    gain = gain_interval(now.about(then.level), now.about(now.level), seed)
+    if not gain.low > 0.0:  # NaN where too little is left to say
+        return None
+    error = float(np.hypot(then.error, now.error))
+    levels = (with_error(then.level, then.error), with_error(now.level, now.error), with_error(moved, error))
+    size = ChangedSize("torque", "N.m", *levels)
+    p_value = float(stats.ttest_ind(then.means, now.means, equal_var=False).pvalue)
+    return SteadyLoad(joint + 1, size, gain, p_value)
+
 
 LEAST_UNKNOWN = 0.25  # of the rms: recordings of an unchanged finger differ by this much
 LEVEL = 0.001  # significance level of this difference
@@ -43,7 +127,7 @@ def diagnose_change(asked: Asked, base: Base) -> Diagnosis:
     return _Changes(asked, base).diagnosis()
 
 
-def sizes_now(asked: Asked, base: Base, keys: Sequence[Key]) -> list[tuple[Key, ChangedSize]]:
+def sizes_now(asked: Asked, base: Base, keys: Sequence[Where]) -> list[tuple[Where, ChangedSize]]:
     """Return how large these effects are in the new recordings, named or not."""
     return _Changes(asked, base).sizes(keys)
 
@@ -73,13 +157,13 @@ class _Changes:
             dropped = self._verified()
             return self._result(dropped)
 
-    def sizes(self, keys: Sequence[Key]) -> list[tuple[Key, ChangedSize]]:
+    def sizes(self, keys: Sequence[Where]) -> list[tuple[Where, ChangedSize]]:
         """Return the sizes of effects at places in the new recordings, all of them free."""
         search = self._search = self._searching(self._without_events())
         search.free(keys)
         changes = [search.certain(k) for k in range(len(search.causes))]
         listed = [sized(search, changes, k) for k in range(len(changes))]
-        return [(change.key, change.changed) for change in listed if change.changed is not None]
+        return [(change.where, change.changed) for change in listed if change.changed is not None]
 
     def _without_events(self) -> Samples:
         """Return the samples without contact and stalls."""

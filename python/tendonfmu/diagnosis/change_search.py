@@ -16,11 +16,9 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from tendonfmu.arrays import Array, Data, Flags, Numbers
-from tendonfmu.diagnosis.cause import Cause, Key, with_error
-from tendonfmu.diagnosis.effects import Term
+from tendonfmu.diagnosis.candidate_columns import number_hypotheses, numbers_of, with_numbers
+from tendonfmu.diagnosis.effects import Term, Where
 from tendonfmu.diagnosis.extension_fit import extended_description
-from tendonfmu.diagnosis.hypotheses import number_hypotheses, numbers_of, with_numbers
-from tendonfmu.diagnosis.least_sizes import LeastSizes
 from tendonfmu.diagnosis.reference import (
     background_columns,
     find_repeats,
@@ -29,9 +27,17 @@ from tendonfmu.diagnosis.reference import (
     less_reference,
     outside,
 )
-from tendonfmu.diagnosis.samples import Samples
-from tendonfmu.diagnosis.selection import CERTAIN, SIGNIFICANCE, CauseSearch, Selection, is_alike, names_with
-from tendonfmu.diagnosis.series import exact_model
+from tendonfmu.diagnosis.result import Cause, with_error
+from tendonfmu.diagnosis.samples import Samples, exact_model
+from tendonfmu.diagnosis.selection import (
+    CERTAIN,
+    SIGNIFICANCE,
+    CauseSearch,
+    LeastSizes,
+    Selection,
+    is_alike,
+    names_with,
+)
 from tendonfmu.diagnosis.view import look
 from tendonfmu.model import moment_arms
 from tendonfmu.statistics import Grams, Interval, Products
@@ -90,7 +96,7 @@ class ChangeSearch(CauseSearch):
         self.folds, self.judged = folds_of_sides(learned, self.sides.now)
         self.candidates = self._candidates()
         self._known: dict[bytes, tuple[Products, Flags]] = {}
-        self.tried = len({cause.key for cause in self.candidates})
+        self.tried = len({cause.where for cause in self.candidates})
         self._selection: Selection | None = None
         self._whole = self.error
 
@@ -201,11 +207,11 @@ class ChangeSearch(CauseSearch):
             self.causes = self.moved_on(self.grams())
         self._selection = None
 
-    def free(self, keys: Sequence[Key]) -> None:
+    def free(self, keys: Sequence[Where]) -> None:
         """Free these effects at these places in the new recordings, whether they are certain or not."""
         for key in keys:
             grams = self.selection.grams
-            own = [cause for cause in self.candidates if cause.key == key]
+            own = [cause for cause in self.candidates if cause.where == key]
             if own:
                 bounds = [(cause.direction.mix, cause.direction.low, cause.direction.high) for cause in own]
                 best = own[int(np.argmin([grams.error(*bound)[0] for bound in bounds]))]

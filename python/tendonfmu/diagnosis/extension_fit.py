@@ -15,11 +15,10 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.arrays import Array, Data, Numbers
-from tendonfmu.diagnosis.cause import with_error
-from tendonfmu.diagnosis.effects import Term
-from tendonfmu.diagnosis.effects.description_edit import sides_at
-from tendonfmu.diagnosis.effects.memory import PRESLIDING, memory_of, needs_presliding
+from tendonfmu.diagnosis.effects import Place, Term, by_name
+from tendonfmu.diagnosis.effects.candidate import sides_at
 from tendonfmu.diagnosis.effects.terms import changed_law
+from tendonfmu.diagnosis.result import with_error
 from tendonfmu.diagnosis.samples import Samples
 from tendonfmu.estimate import (
     Choice,
@@ -39,6 +38,73 @@ from tendonfmu.estimate import (
 from tendonfmu.model import effects, extension_rows, finger_from_data, law_path, native
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import MEMORY, Interval
+
+# --- memory of friction -----------------------------------------------------------------------------------------------
+
+
+REMEMBERING = PRESLIDING, RELAXATION, CORDS = "presliding", "relaxation", "cord_stretch"
+Row = Mapping[str, Any]  # of `extensions`
+
+
+@dataclass(frozen=True)
+class MemoryTerm(Term):
+    """A part of the memory; its rows take the place of what the description has of it."""
+
+    rows: tuple[Row, ...] = ()
+
+    def added_to(self, data: Data) -> dict[str, Any]:
+        """Return the description with this part."""
+        present = list(data.get("extensions") or [])
+        elements = [row for row in present if row["effect"] == PRESLIDING]
+        others = [row for row in present if row["effect"] not in (PRESLIDING, CORDS)]
+        cords = [row for row in present if row["effect"] == CORDS]
+        if self.candidate.name == PRESLIDING:
+            elements = [dict(row) for row in self.rows]
+        elif self.candidate.name == RELAXATION:
+            times = [row["relaxation_time"] for row in self.rows]
+            elements = [{**row, "relaxation_time": time} for row, time in zip(elements, times, strict=True)]
+        else:
+            cords = [dict(row) for row in self.rows]
+        return {**data, "extensions": [*others, *elements, *cords]}
+
+
+def memory_terms(data: Data, rows: Sequence[Row]) -> list[tuple[Term, ...]]:
+    """Return what a description lacks of the rows of a memory, each part as the terms of one cause."""
+    given = memory_of(data)
+    chosen = [row for row in rows if row["effect"] == PRESLIDING]
+    parts: list[tuple[Term, ...]] = []
+    if [_form(row) for row in chosen] != [_form(row) for row in given if row["effect"] == PRESLIDING]:
+        bare = tuple({key: value for key, value in row.items() if key != "relaxation_time"} for row in chosen)
+        parts.append((_term(PRESLIDING, bare),))
+    relaxing = all("relaxation_time" in row for row in chosen) and chosen
+    if relaxing and not any("relaxation_time" in row for row in given):
+        parts.append((_term(RELAXATION, tuple(chosen)),))
+    cords = tuple(row for row in rows if row["effect"] == CORDS)
+    if cords and not any(row["effect"] == CORDS for row in given):
+        parts.append((_term(CORDS, cords),))
+    return parts
+
+
+def memory_of(data: Data) -> list[Row]:
+    """Return the rows of memory of a description."""
+    return [row for row in data.get("extensions") or [] if row["effect"] in (PRESLIDING, CORDS)]
+
+
+def needs_presliding(term: Term) -> bool:
+    """Return whether a term is part of a memory that presliding has to be there for."""
+    return term.candidate.name in (RELAXATION, CORDS)
+
+
+def _term(name: str, rows: tuple[Row, ...]) -> MemoryTerm:
+    return MemoryTerm(by_name(name), Place(), rows=rows)
+
+
+def _form(row: Row) -> tuple[Any, ...]:
+    """Return what a row is about, whatever its numbers are."""
+    return tuple(row.get(key) for key in ("joint", "tendon", "level")), "displacement" in row, "share" in row
+
+
+# --- all numbers ------------------------------------------------------------------------------------------------------
 
 PLACE = ("effect", "joint", "tendon", "level")
 MOST_STEPS = 20

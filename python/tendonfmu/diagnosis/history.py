@@ -16,7 +16,7 @@ import os
 import re
 import zlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from datetime import datetime, timezone
 from itertools import pairwise
 from pathlib import Path
@@ -27,25 +27,17 @@ import numpy as np
 from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.answer import Asked
 from tendonfmu.diagnosis.base import find_base
-from tendonfmu.diagnosis.cause import ChangedSize, Where
 from tendonfmu.diagnosis.change_diagnosis import sizes_now
 from tendonfmu.diagnosis.diagnosis import LEAST_GAIN, diagnose
+from tendonfmu.diagnosis.effects import Where
 from tendonfmu.diagnosis.extension_fit import FitSettings
 from tendonfmu.diagnosis.inputs import read_input
 from tendonfmu.diagnosis.kinematic_causes import find_kinematic_causes
+from tendonfmu.diagnosis.result import ChangedSize
 from tendonfmu.errors import InputError
 from tendonfmu.model import Finger, read_finger
 from tendonfmu.statistics import Interval
-from tendonfmu.tasks import (
-    Job,
-    Phases,
-    fault_words,
-    refuse_if_all_failed,
-    row_file,
-    rows_of,
-    run_jobs,
-    version_here,
-)
+from tendonfmu.tasks import Job, Phases, fault_words, refuse_if_all_failed, row_file, rows_of, run_jobs, version_here
 
 File = str | os.PathLike[str]
 
@@ -186,7 +178,7 @@ def named_in(
     return {
         "recording": recording,
         "verdict": diagnosis.verdict,
-        "keys": json.dumps([[cause.where.effect, cause.where.joint, cause.where.tendon] for cause in diagnosis.causes]),
+        "keys": json.dumps([astuple(cause.where) for cause in diagnosis.causes]),
         "gains": json.dumps(causes),
         "titles": json.dumps({key_text(cause.where): cause.title for cause in diagnosis.causes}),
     }
@@ -198,20 +190,17 @@ def sizes_in(
     """Return a row: the sizes of these effects at these places in one recording, all of them free."""
     given = read_input(finger, [recording], [], reference, kinematics, least_gain, True)
     kinematic = find_kinematic_causes(given, least_gain, seed)
-    given, named = kinematic.corrected(given), [tuple(key) for key in json.loads(keys)]
+    given, named = kinematic.corrected(given), [Where(*key) for key in json.loads(keys)]
     settings = FitSettings(threads=1, path=given.finger.path)
     asked = Asked(given, 0.0, seed, settings, Phases({}))
     base = find_base(given.finger, given.reference, settings, least_gain)
     sizes = sizes_now(asked, base, [key for key in named if key not in kinematic.known])
     sizes += [(key, kinematic.known[key].size) for key in named if key in kinematic.known]
-    return {
-        "recording": recording,
-        "sizes": json.dumps({key_text(Where(*key)): _written(size) for key, size in sizes}),
-    }
+    return {"recording": recording, "sizes": json.dumps({key_text(where): _written(size) for where, size in sizes})}
 
 
 def key_text(where: Where) -> str:
-    return json.dumps([where.effect, where.joint, where.tendon])
+    return json.dumps(astuple(where))
 
 
 def _written(size: ChangedSize) -> dict[str, Any]:

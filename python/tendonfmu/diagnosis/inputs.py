@@ -11,7 +11,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from tendonfmu.arrays import Flags, Numbers
+from tendonfmu.arrays import Numbers, flagged_rows
 from tendonfmu.diagnosis.gain import require_unseen
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import check_unseen
@@ -141,7 +141,8 @@ def _compared(finger: Finger, then: Sequence[FitRecording], now: Sequence[FitRec
     """Return warnings about recordings of the reference and of now."""
     for side, role in ((then, "reference"), (now, "recording")):
         for recording in side:
-            if _longest(recording.train | recording.held_out) * np.median(np.diff(recording.time)) < SHORTEST:
+            longest = max((end - begin for begin, end in flagged_rows(recording.train | recording.held_out)), default=0)
+            if longest * np.median(np.diff(recording.time)) < SHORTEST:
                 raise InputError(
                     f"{recording.path}: {role} has no free motion of {SHORTEST:g} s on end: others are labelled "
                     "contact or left out; expected a recording of free motion"
@@ -152,19 +153,12 @@ def _compared(finger: Finger, then: Sequence[FitRecording], now: Sequence[FitRec
     return list(_different_conditions(then, now))
 
 
-def _longest(free: Flags) -> int:
-    """Return the largest number of samples on end that are flagged [N]."""
-    ends = np.flatnonzero(np.diff(np.concatenate([[False], free, [False]])))
-    return int(np.diff(ends.reshape(-1, 2), axis=1).max(initial=0))
-
-
 def _refuse_overlap(then: FitRecording, now: FitRecording) -> None:
     """Raise InputError if a stretch of one recording is in the other, also if it is at other times."""
     known = {row.tobytes(): k for k, row in enumerate(_rows(then))}
     at = np.array([known.get(row.tobytes(), -1) for row in _rows(now)])
     same = (at >= 0) & np.concatenate([[True], np.diff(at) == 1])
-    ends = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(np.int8), [0]])))
-    for begin, end in zip(ends[::2], ends[1::2], strict=True):
+    for begin, end in flagged_rows(same):
         if end - begin >= SHARED and np.ptp(_rows(now)[begin:end], axis=0).max() > 0.0:
             raise InputError(
                 f"{now.path}: {now.time[begin]:g} to {now.time[end - 1]:g} s are the same samples as "

@@ -8,6 +8,7 @@ equation leaves, in metres over all tendons, that it removes on unseen samples.
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -17,26 +18,75 @@ import numpy as np
 from scipy.special import ndtr
 
 from tendonfmu.arrays import Data, Numbers
-from tendonfmu.diagnosis.cause import Cause, CausePlace, Key, Where
-from tendonfmu.diagnosis.effects.description_edit import add_to_number, data_number
+from tendonfmu.diagnosis.effects import Where
+from tendonfmu.diagnosis.effects.candidate import add_to_number, data_number
+from tendonfmu.diagnosis.effects.words import NBSP, quantity
 from tendonfmu.diagnosis.inputs import Input
-from tendonfmu.diagnosis.kinematic_words import EXPLANATIONS, size_of_all
-from tendonfmu.diagnosis.moved_zeros import encoder_offsets, offset_of
 from tendonfmu.diagnosis.names import ENCODER, ZERO, title_of
-from tendonfmu.diagnosis.result import Diagnosis
+from tendonfmu.diagnosis.result import Cause, CausePlace, ChangedSize, Diagnosis
 from tendonfmu.diagnosis.selection import SIGNIFICANCE, by_gain
-from tendonfmu.diagnosis.tendon_equation import ARM, COUPLING, SPRING, Geometry, Off, Unseen, rows_of
-from tendonfmu.model import finger_from_data, moment_arms
-from tendonfmu.recordings import (
-    FitRecording,
-    Held,
-    Learned,
-    TendonRouting,
-    learn_routing,
-    prepare,
-    varying_sentences,
+from tendonfmu.diagnosis.tendon_equation import (
+    ARM,
+    COUPLING,
+    SPRING,
+    Geometry,
+    Off,
+    Unseen,
+    encoder_offsets,
+    offset_of,
+    rows_of,
 )
+from tendonfmu.model import finger_from_data, moment_arms
+from tendonfmu.recordings import FitRecording, Held, Learned, TendonRouting, learn_routing, prepare, varying_sentences
 from tendonfmu.statistics import Interval
+
+# --- in words ---------------------------------------------------------------------------------------------------------
+
+
+EXPLANATIONS = {
+    ENCODER: (
+        "All tendons of this joint agree on another angle than its encoder reads: the encoder's disc or its coupling "
+        "has slipped, or it was set to zero in another pose. A description has no number for this: set the "
+        'encoder to zero again, or write its offset into the map of columns ("offset" at joint_position).'
+    ),
+    ZERO: (
+        "This tendon's motor reads another position than the joints and the other tendons show: the tendon has "
+        "slipped on its drum, was attached again, or its motor lost its count. The extended model has its zero."
+    ),
+    "moment_arm": (
+        "The tendon moves more or less per angle of this joint than described. Measure the pulley's radius and add "
+        "half the tendon's thickness; look whether the tendon runs on its pulley. The extended model has the arm."
+    ),
+    "tendon_nonlinearity": (
+        "The tendon stretches more or less under its force than described: another tendon, one that is worn, or the "
+        "gain of its force sensor. The extended model has the stiffness."
+    ),
+    "joint_coupling": (
+        "The tendon moves with a joint that it does not pass in the description: it passes beside the joint's axis. "
+        "The extended model has the moment arm."
+    ),
+}
+
+
+def size_of_all(effect: str, sizes: Sequence[ChangedSize], is_change: bool) -> str:
+    """Return the size of a cause in words, the largest first."""
+    where = f", at the largest of {len(sizes)} places" if len(sizes) > 1 else ""
+    return f"{_size(effect, sizes[0], is_change)}{where}"
+
+
+def _size(effect: str, size: ChangedSize, is_change: bool) -> str:
+    then, now = ("then", "now") if is_change else ("described", "recorded")
+    if effect == ENCODER:
+        degrees = math.degrees(size.change.value)
+        base = "before" if is_change else "the tendons show"
+        return f"it reads {abs(degrees):.3g}° {'more' if degrees > 0 else 'less'} than {base}"
+    ends = f"{quantity(size.reference.value, size.unit)} {then}, {quantity(size.now.value, size.unit)} {now}"
+    if effect == ZERO:
+        return f"{quantity(size.change.value, size.unit, sign=True)}: {ends}"
+    if not size.reference.value:
+        return ends
+    return f"{100.0 * size.change.value / size.reference.value:+.2g}{NBSP}%: {ends}".replace("-", "−")
+
 
 LEAST_SHARE = {ARM: 0.02, SPRING: 0.03, COUPLING: 0.02}  # of the number; of a coupling, of the tendon's largest arm
 LEAST_ANGLE = 0.004  # rad, a quarter of a degree: of an encoder; a zero turns the joint by as much
@@ -48,7 +98,7 @@ class KinematicCauses:
     """What is off, and what it is worth."""
 
     is_change: bool
-    known: dict[Key, Off] = field(default_factory=dict)  # every number that the recordings show
+    known: dict[Where, Off] = field(default_factory=dict)  # every number that the recordings show
     off: tuple[Off, ...] = ()  # those that are causes
     causes: tuple[Cause, ...] = ()
     too_small: tuple[Cause, ...] = ()
@@ -170,8 +220,7 @@ def find_kinematic_causes(given: Input, least_gain: float, seed: int) -> Kinemat
     off = [each for each in known.values() if _is_certain(each, len(known)) and (each.where.effect != ZERO)]
     off += [each for each in known.values() if each.where in single and _is_certain(each, len(known))]
     off += [each for each in offsets if _is_certain(each, len(known))]
-    keys = {(where.effect, where.joint, where.tendon): each for where, each in known.items()}
-    keys |= {(ENCODER, j, None): each for j, each in _by_joint(given.finger.data, known)}
+    keys = known | {Where(ENCODER, j): each for j, each in _by_joint(given.finger.data, known)}
     warnings = () if reference else tuple(varying_sentences(given.finger, learned))
     found = replace(none, known=keys, warnings=warnings)
     if not is_long:

@@ -19,7 +19,7 @@ from scipy.signal import correlate
 from tendonfmu.arrays import Array, Flags, Numbers
 from tendonfmu.diagnosis.candidate_columns import CandidateColumns
 from tendonfmu.diagnosis.remainder_features import Features, features
-from tendonfmu.diagnosis.series import Series
+from tendonfmu.diagnosis.samples import Series
 from tendonfmu.model import moment_arms
 from tendonfmu.statistics import Folds, make_folds
 
@@ -143,7 +143,7 @@ def _repeat(series: Series, force: Numbers, then: int, now: int) -> Repeat | Non
     if min(map(len, time)) * step < SHORTEST or any(np.diff(times).max() > 1.5 * step for times in time):
         return None
     for lag in _lags(angle[0], angle[1], math.ceil(SHORTEST / step)):
-        begin, end = _shared(len(angle[0]), len(angle[1]), lag)
+        begin, end = max(0, -lag), min(len(angle[0]), len(angle[1]) - lag)  # blocks that both have
         if (end - begin) * step < SHORTEST:
             continue
         one, other = angle[0][begin:end], angle[1][begin + lag : end + lag]
@@ -164,11 +164,6 @@ def _same_load(force: Numbers, rows: Sequence[Flags], begin: int, end: int, lag:
     one, other = force[rows[0]][begin:end], force[rows[1]][begin + lag : end + lag]
     apart = np.sqrt(np.mean((one - other) ** 2, axis=0))
     return bool((apart <= SAME_FORCES * np.sqrt(np.mean(one**2, axis=0))).all())
-
-
-def _shared(one: int, other: int, lag: int) -> tuple[int, int]:
-    """Return the first block of the first motion that the second one has, too, and the one after the last."""
-    return max(0, -lag), min(one, other - lag)
 
 
 def _lags(one: Numbers, other: Numbers, fewest: int) -> Iterator[int]:

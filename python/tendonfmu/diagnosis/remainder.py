@@ -4,7 +4,7 @@ Two methods look at it:
 
 - flexible learners without physics on everything that is known of the motion and its past, judged on unseen
   stretches (remainder_learner.py);
-- a search for steady oscillations in time (statistics/spectral_line.py).
+- a search for steady oscillations in time (statistics/whitening.py).
 """
 
 from __future__ import annotations
@@ -12,27 +12,27 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import combinations_with_replacement
+from itertools import combinations, combinations_with_replacement
 
 import numpy as np
 from scipy.signal import welch
 from scipy.stats import ttest_1samp
 
-from tendonfmu.arrays import Numbers
-from tendonfmu.diagnosis.remainder_features import GROUPS, LAW, Features, Finding, features, run_starts, tree_states
-from tendonfmu.diagnosis.remainder_learner import Learner
-from tendonfmu.diagnosis.remainder_states import planted
-from tendonfmu.diagnosis.result import Unexplained
-from tendonfmu.diagnosis.series import Series
-from tendonfmu.statistics import (
-    Interval,
-    Splines,
-    Whitener,
-    find_lines,
-    make_folds,
-    standard_error,
-    whitener,
+from tendonfmu.arrays import Indices, Numbers
+from tendonfmu.diagnosis.remainder_features import (
+    GROUPS,
+    LAW,
+    Features,
+    Finding,
+    features,
+    planted,
+    run_starts,
+    tree_states,
 )
+from tendonfmu.diagnosis.remainder_learner import Learner
+from tendonfmu.diagnosis.result import RemainderMap, Unexplained
+from tendonfmu.diagnosis.samples import Series
+from tendonfmu.statistics import Interval, Splines, Whitener, find_lines, make_folds, standard_error, whitener
 
 LEVEL = 0.01  # probability of a wrong "unknown", family-wise
 LEAST_SHARE = 0.02  # of the residual's variance: smaller parts are not reported
@@ -290,3 +290,63 @@ def _rms_gain(gain: Numbers, share: float, square: float) -> Interval:
     """Return 1 − rms ratio of a share of the variance, from what each stretch [K] gains of a sum of squares."""
     half = CERTAIN * standard_error(gain) / square if square > 0.0 else 0.0
     return Interval(*(1.0 - float(np.sqrt(1.0 - min(end, 1.0))) for end in (share, share - half, share + half)))
+
+
+# --- where it shows ---------------------------------------------------------------------------------------------------
+
+
+CELLS = 14  # on each side
+COARSE = 2  # cells on each side of those in which the choice of the signals is made
+FEWEST = 5  # blocks in a cell that is drawn
+
+
+def remainder_map(
+    series: Series, left: Numbers, remainder: Remainder, joints: Sequence[str], tendons: Sequence[str]
+) -> RemainderMap | None:
+    """Return the map of the joint with the largest prediction [B, n], N·m; None if nothing is predicted."""
+    power = np.sum(remainder.prediction[series.used] ** 2, axis=0)
+    joint = int(np.argmax(power))
+    if not power[joint]:
+        return None
+    signals = _signals(series, joints, tendons)
+    followed = {finding.group for finding in remainder.findings if finding.joint == joint + 1}
+    if "angle" in followed and len(joints) > 1:
+        signals = {label: values for label, values in signals.items() if label.startswith("angle")}
+    cells = {name: _cells(values[series.used]) for name, values in signals.items()}
+    if len(cells) < 2:
+        return None
+    wave = left[series.used, joint]
+    one, two = max(combinations(cells, 2), key=lambda pair: _comes_back(wave, *(cells[name][1] for name in pair)))
+    (columns, column), (rows, row) = cells[one], cells[two]
+    number = row * CELLS + column
+    count = np.bincount(number, minlength=CELLS**2)
+    total = np.bincount(number, left[series.used, joint], minlength=CELLS**2)
+    mean = np.where(count >= FEWEST, total / np.maximum(count, 1), np.nan)
+    return RemainderMap(joint + 1, (one, two), (columns, rows), mean.reshape(CELLS, CELLS))
+
+
+def _signals(series: Series, joints: Sequence[str], tendons: Sequence[str]) -> dict[str, Numbers]:
+    """Return the recorded signals [B] that vary, by their labels."""
+    signals = {f"angle of {name} (rad)": series.angle[:, j] for j, name in enumerate(joints)}
+    signals |= {f"velocity of {name} (rad/s)": series.velocity[:, j] for j, name in enumerate(joints)}
+    signals |= {f"force of {name} (N)": series.force[:, i] for i, name in enumerate(tendons)}
+    return {label: values for label, values in signals.items() if np.ptp(values[series.used]) > 1e-12}
+
+
+def _cells(values: Numbers) -> tuple[Numbers, Indices]:
+    """Return the edges of cells of equal width between the outer hundredths of the values, and the cell of each."""
+    low, high = np.quantile(values, (0.01, 0.99))
+    edges = np.linspace(low, max(high, low + 1e-12), CELLS + 1)
+    return edges, np.clip(np.searchsorted(edges, values, side="right") - 1, 0, CELLS - 1)
+
+
+def _comes_back(wave: Numbers, column: Indices, row: Indices) -> float:
+    """Return by how much the cells' means of one half of a wave [R] lower the squares of the other half."""
+    # slow signals such as the pretension are never twice at one place, so they would follow any wave within a half
+    number = row // COARSE * CELLS + column // COARSE
+    gain, middle = 0.0, len(wave) // 2
+    for seen, unseen in ((slice(middle), slice(middle, None)), (slice(middle, None), slice(middle))):
+        count = np.bincount(number[seen], minlength=CELLS**2)
+        mean: Numbers = np.bincount(number[seen], wave[seen], minlength=CELLS**2) / (count + FEWEST)
+        gain += float(np.sum(wave[unseen] ** 2 - (wave[unseen] - mean[number[unseen]]) ** 2))
+    return gain

@@ -12,18 +12,109 @@ measured forces less the unexplained torque, which is spread over the tendons as
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tendonfmu.arrays import Array, Data, Flags, Numbers
-from tendonfmu.diagnosis.series import Series, exact_model, make_series
 from tendonfmu.estimate import CoreRuns, SlowDrift, slowest_drift
-from tendonfmu.model import extension_rows, moment_arms
-from tendonfmu.recordings import FitRecording, Grid
-from tendonfmu.statistics import Splines
+from tendonfmu.model import extension_rows, moment_arms, native, number_of, without_learning
+from tendonfmu.recordings import FitRecording, Grid, Segment, delayed_torque
+from tendonfmu.statistics import BlockSeries, Splines
+
+# --- signals of recordings --------------------------------------------------------------------------------------------
+# G_k = T_k + Σ Δb up to k is a model's torque with all jumps of fig. 5. A diagnosis looks only at what it leaves, y −
+# G.
+
+
+@dataclass(frozen=True)
+class Series(BlockSeries):
+    """Block means of all recordings, one after another; n joints, m tendons."""
+
+    angle: Numbers  # rad [B, n]
+    velocity: Numbers  # rad/s [B, n]
+    acceleration: Numbers  # rad/s² [B, n]
+    force: Numbers  # N [B, m]
+    tendon_velocity: Numbers  # ẋ_ij, m/s [B, m, n]
+    travel: Numbers  # travel since the joint last reversed, rad [B, n]
+
+
+def _image(data: Mapping[str, Any]) -> Any:
+    """Return the image of a description with a bias that only jumps and without contact detection."""
+    bare = without_learning(data)
+    return native.image_from_json(json.dumps({**bare, "bias": {**bare["bias"], "forget_rate": 0.0}}))
+
+
+def exact_model(data: Mapping[str, Any], recording: FitRecording, *, jumps: bool = True) -> Numbers:
+    """Return G of a description from a run of the core, N·m [N, n]; NaN outside of the parts."""
+    image, residual = _image(data), np.full(recording.target.shape, np.nan)
+    for part in recording.parts:
+        arrays = recording.arrays(part)
+        outputs = native.Instance(image, kinematics_source=recording.kinematics).run(arrays)
+        residual[part] = outputs["friction_torque"] - delayed_torque(data, arrays, outputs["joint_torque"])
+        if not jumps:
+            residual[part] -= outputs["bias_torque"]
+    return residual
+
+
+# --- the series -------------------------------------------------------------------------------------------------------
+
+
+def make_series(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, left: Numbers) -> Series:
+    """Average the signals over the blocks of a grid; `left` is what a description leaves of the torque [B, n], N·m."""
+    whole = [recordings[segment.recording] for segment in grid.segments]
+    pieces = list(zip(grid.segments, whole, strict=True))
+    threshold, arms = number_of(data, "velocity_threshold.joint"), moment_arms(data)
+    velocity = grid.means([recording.model.joint_speed for recording in recordings])
+    return Series(
+        time=grid.means([recording.time for recording in recordings]),
+        recording=np.concatenate([np.full(segment.count, segment.recording) for segment in grid.segments]),
+        segment=np.concatenate([np.full(segment.count, k) for k, segment in enumerate(grid.segments)]),
+        target=left,
+        used=np.concatenate([segment.mean(recording.train[segment.part]) == 1.0 for segment, recording in pieces]),
+        step=grid.step,
+        angle=grid.means([recording.model.joint_angle for recording in recordings]),
+        velocity=velocity,
+        acceleration=np.concatenate([_slope(velocity[segment.blocks], grid.step) for segment in grid.segments]),
+        force=grid.forces(recordings),
+        tendon_velocity=_tendon_velocity(arms, velocity),
+        travel=np.concatenate(
+            [
+                _travel(recording.model.joint_angle, recording.model.joint_speed, threshold, segment)
+                for segment, recording in pieces
+            ]
+        ),
+    )
+
+
+def _slope(values: Numbers, step: float) -> Numbers:
+    return np.gradient(values, step, axis=0) if len(values) > 1 else np.zeros_like(values)
+
+
+def _tendon_velocity(arms: Numbers, velocity: Numbers) -> Numbers:
+    """Return ẋ_ij = Σ_{j'≥j} r_ij' q̇_j' (eq. 5), m/s [B, m, n], for moment arms [m, n]."""
+    products = velocity[:, None, :] * arms[None]
+    return np.asarray(np.cumsum(products[:, :, ::-1], axis=2)[:, :, ::-1])
+
+
+def _travel(angle: Numbers, speed: Numbers, threshold: float, segment: Segment) -> Numbers:
+    """Return the travel since each joint last reversed, rad [count, n]; speeds below the threshold do not count."""
+    angle, speed = angle[segment.part], speed[segment.part]
+    travel = np.empty_like(angle)
+    for j in range(angle.shape[1]):
+        moving = np.abs(speed[:, j]) > threshold
+        last = np.maximum.accumulate(np.where(moving, np.arange(len(angle)), 0))
+        side = np.sign(speed[last, j])
+        turned = np.flatnonzero(np.diff(side, prepend=side[0]))
+        start = np.zeros(len(angle), dtype=np.int64)
+        start[turned] = turned
+        travel[:, j] = np.abs(angle[:, j] - angle[np.maximum.accumulate(start), j])
+    return segment.mean(travel)
+
 
 RATE = 160.0  # Hz, of the runs, at least: elements take any step, and friction changes in tens of milliseconds
 MOST_SHIFT = 10.0  # times the largest measured force
@@ -137,17 +228,17 @@ def predicted_forces(data: Mapping[str, Any], recordings: Sequence[FitRecording]
     pulls = np.array([not tendon.get("bidirectional") for tendon in data["tendons"]])
     moved = []
     for recording in recordings:
-        groups = dict(recording.recording.groups)
+        groups = recording.recording.groups
         force = groups["tendon_force"]
         most = MOST_SHIFT * np.abs(force).max(initial=0.0)  # a model that explains nothing predicts no forces either
         shift = np.clip(_unexplained(data, recording) @ spread, -most, most)
         predicted = np.where(pulls & (force > 0), np.maximum(force - shift, 0.0), force - shift)
-        groups["tendon_force"] = predicted
+        changed = {"tendon_force": predicted}
         if "tendon_position" in groups:
             # a description with a delay pairs the present position with the force `delay` s later
-            change = _shifted(recording, (predicted - force) / stiffness, _delay(data))
-            groups["tendon_position"] = groups["tendon_position"] + change
-        moved.append(replace(recording, recording=replace(recording.recording, groups=groups)))
+            change = shifted(recording, (predicted - force) / stiffness, _delay(data))
+            changed["tendon_position"] = groups["tendon_position"] + change
+        moved.append(recording.with_groups(**changed))
     return moved
 
 
@@ -157,16 +248,16 @@ def _delay(data: Mapping[str, Any]) -> float:
     return float(sum(row["delay"] for row in rows if row["effect"] == "time_delay"))
 
 
-def _shifted(recording: FitRecording, values: Numbers, delay: float) -> Numbers:
+def shifted(recording: FitRecording, values: Numbers, delay: float) -> Numbers:
     """Return the values [N, m] of `delay` s later, within each part."""
     if not delay:
         return values
-    shifted: Numbers = values.copy()
+    later: Numbers = values.copy()
     for part in recording.parts:
         time = recording.time[part]
         for i in range(values.shape[1]):
-            shifted[part, i] = np.interp(time + delay, time, values[part, i])
-    return shifted
+            later[part, i] = np.interp(time + delay, time, values[part, i])
+    return later
 
 
 def _unexplained(data: Mapping[str, Any], recording: FitRecording) -> Numbers:
@@ -182,14 +273,68 @@ def _unexplained(data: Mapping[str, Any], recording: FitRecording) -> Numbers:
 
 def with_late_forces(recordings: Sequence[FitRecording], delay: float) -> list[FitRecording]:
     """Return recordings whose forces come `delay` s later."""
-    late = []
-    for recording in recordings:
-        groups = dict(recording.recording.groups)
-        force = groups["tendon_force"].copy()
-        for part in recording.parts:
-            time = recording.time[part]
-            for i in range(force.shape[1]):
-                force[part, i] = np.interp(time - delay, time, groups["tendon_force"][part, i])
-        groups["tendon_force"] = force
-        late.append(replace(recording, recording=replace(recording.recording, groups=groups)))
-    return late
+    return [
+        each.with_groups(tendon_force=shifted(each, each.recording.groups["tendon_force"], -delay))
+        for each in recordings
+    ]
+
+
+# --- what range recordings cover --------------------------------------------------------------------------------------
+
+
+_OUTER = 0.01  # share of samples outside of each end of a range, so that single outliers do not stretch it
+_FAST = 0.95  # quantile that counts as fast
+_LOOKED_AT = 50_000  # samples that are looked at, about
+
+
+@dataclass(frozen=True)
+class Span:
+    """Ranges of the signals over all samples that are used."""
+
+    angle: Numbers  # 1 % and 99 % quantiles, rad [n, 2]
+    speed: Numbers  # 95 % quantile of |q̇|, rad/s [n]
+    tendon_speed: Numbers  # 95 % quantile of |ẋ_ij|, m/s [m, n]
+    position: Numbers  # 1 % and 99 % quantiles of the joint-side tendon position x1 = R q, m [m, 2]
+    force: Numbers  # 1 % and 99 % quantiles, N [m, 2]
+    torque: Numbers  # standard deviation of the torque to be explained, N·m [n]
+    duration: float  # length of the longest part without a gap, s
+    step: float  # median time between samples, s
+
+
+def span_of(data: Mapping[str, Any], recordings: Sequence[FitRecording]) -> Span:
+    """Measure the span of recordings that were prepared for a valid description."""
+    arms = moment_arms(data)
+    every = max(1, sum(len(recording.time) for recording in recordings) // _LOOKED_AT)
+    rows = [np.flatnonzero(recording.train)[::every] for recording in recordings]
+    angle, speed, force, torque = (
+        np.concatenate(signals)
+        for signals in zip(
+            *(_signals(recording, row) for recording, row in zip(recordings, rows, strict=True)), strict=True
+        )
+    )
+    sliding = np.cumsum((speed[:, None, :] * arms)[:, :, ::-1], axis=2)[:, :, ::-1]
+    steps = np.concatenate([np.diff(recording.time[part]) for recording in recordings for part in recording.parts])
+    return Span(
+        angle=_range(angle),
+        speed=np.quantile(np.abs(speed), _FAST, axis=0),
+        tendon_speed=np.quantile(np.abs(sliding), _FAST, axis=0),
+        position=_range(angle @ arms.T),
+        force=_range(force),
+        torque=np.std(torque, axis=0),
+        duration=max(
+            float(recording.time[part][-1] - recording.time[part][0])
+            for recording in recordings
+            for part in recording.parts
+        ),
+        step=float(np.median(steps)),
+    )
+
+
+def _signals(recording: FitRecording, rows: NDArray[np.intp]) -> tuple[Numbers, ...]:
+    model, force = recording.model, recording.recording.groups["tendon_force"]
+    return tuple(values[rows] for values in (model.joint_angle, model.joint_speed, force, recording.target))
+
+
+def _range(values: Numbers) -> Numbers:
+    """Return 1 % and 99 % quantiles [k, 2] of values [N, k]."""
+    return np.asarray(np.quantile(values, [_OUTER, 1 - _OUTER], axis=0).T)

@@ -9,19 +9,105 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.stats import ttest_1samp
 
-from tendonfmu.arrays import Numbers
-from tendonfmu.diagnosis.cause import HERE, Cause, Direction, Key, with_error
-from tendonfmu.diagnosis.effects import COMMON
-from tendonfmu.diagnosis.least_sizes import LeastSizes
-from tendonfmu.diagnosis.result import ABSORBED, Invisible
+from tendonfmu.arrays import Data, Numbers
+from tendonfmu.diagnosis.candidate_columns import LARGEST_SECANT
+from tendonfmu.diagnosis.effects import COMMON, Candidate, Place, Term, Where
+from tendonfmu.diagnosis.result import ABSORBED, HERE, Cause, Direction, Invisible, with_error
+from tendonfmu.model import extended_row, moment_arms
+from tendonfmu.recordings import FitRecording, zero_phase
 from tendonfmu.statistics import Grams, standard_error
 from tendonfmu.tasks import Step
+
+# --- what sensors can show --------------------------------------------------------------------------------------------
+# Play must be several times the noise of the positions. A delay must be more than half a sample.
+
+
+OF_NOISE = 4.0  # standard deviations of the position noise
+OF_SAMPLE = 0.75  # samples: velocities are late by half a sample
+NEVER_NEGATIVE = ("preload_friction", "load_friction")  # all their places together
+NOISE_CUTOFF = 15.0  # Hz: faster motion of the positions is noise
+BEFORE_FIT = 0.5  # of the least size: only the fit shows how large an effect is
+
+
+@dataclass(frozen=True)
+class LeastSizes:
+    """What limits the sensors."""
+
+    joint_noise: Numbers  # standard deviation of the noise of the joint positions, rad [n]
+    tendon_noise: Numbers  # standard deviation of the noise of the tendon positions, m [m]
+    step: float  # time between samples, s
+
+    def least(self, where: Where) -> float:
+        """Return the least size in the unit of the effect's number; 0 if none is known."""
+        if where.effect == "time_delay":
+            return OF_SAMPLE * self.step
+        if where.effect == "backlash":
+            if where.joint is not None:
+                return OF_NOISE * float(self.joint_noise[where.joint - 1])
+            if where.tendon is not None:
+                return OF_NOISE * float(self.tendon_noise[where.tendon - 1])
+        return 0.0
+
+    def worth(self, candidate: Candidate, place: Place, shape: Mapping[str, float]) -> bool:
+        """Return whether a step of this size can lead to a size that the sensors resolve."""
+        least = self.least(Where(candidate.name, *place))
+        return least == 0.0 or LARGEST_SECANT * abs(float(next(iter(shape.values())))) >= least
+
+    def shows(self, effect: str, place: Place, row: Mapping[str, Any] | None) -> bool:
+        """Return whether a fitted play or delay, a row of `extensions`, is large enough."""
+        number = {"backlash": "width", "time_delay": "delay"}.get(effect)
+        if row is None or number is None:
+            return True
+        return bool(abs(row[number]) >= self.least(Where(effect, *place)))
+
+    def resolved(self, cause: Cause, magnitudes: Sequence[float] | Numbers) -> bool:
+        """Return whether a candidate with these magnitudes [d] is large enough."""
+        least = self.least(cause.where)
+        return least == 0.0 or abs(float(magnitudes[0])) * cause.direction.step >= BEFORE_FIT * least
+
+    def shows_all(self, effect: str, terms: Sequence[Term], data: Data) -> bool:
+        """Return whether the sensors can show the sizes of a fitted effect; no friction is negative."""
+        rows = [extended_row(data, effect, term.place) for term in terms]
+        if effect in NEVER_NEGATIVE and sum(row["coulomb"] for row in rows if row) < 0.0:
+            return False
+        return all(self.shows(effect, term.place, extended_row(data, effect, term.place)) for term in terms)
+
+
+def least_sizes(data: Mapping[str, Any], recordings: Sequence[FitRecording], step: float) -> LeastSizes:
+    """Measure the sensor noise of recordings; `step` is the time between the samples that are estimated from, s."""
+    joints: list[Numbers] = []
+    tendons: list[Numbers] = []
+    stiffness = np.array([tendon["stiffness"] for tendon in data["tendons"]])
+    for recording in recordings:
+        groups = recording.recording.groups
+        angle, force = recording.model.joint_angle, groups["tendon_force"]
+        reached = (
+            groups["tendon_position"] - force / stiffness
+            if "tendon_position" in groups
+            else angle @ moment_arms(data).T
+        )
+        for part in recording.parts:
+            rate = 1.0 / float(np.median(np.diff(recording.time[part])))
+            for values, noise in ((angle[part], joints), (reached[part], tendons)):
+                noise.append(noise_of(values, zero_phase(values, NOISE_CUTOFF, rate)))
+    return LeastSizes(np.max(joints, axis=0), np.max(tendons, axis=0), step)
+
+
+def noise_of(raw: Numbers, smooth: Numbers) -> Numbers:
+    """Return the noise [d] of positions [N, d]: the spread of what smoothing removes, at least that of quantisation."""
+    left = raw - smooth
+    spread = 1.4826 * np.median(np.abs(left - np.median(left, axis=0)), axis=0)
+    steps = np.abs(np.diff(raw, axis=0))
+    quantum = np.array([float(column[column > 0].min(initial=np.inf)) for column in steps.T])
+    return np.maximum(spread, np.where(np.isfinite(quantum) & (quantum > 1e-12), quantum / np.sqrt(12.0), 0.0))
+
 
 MOST_REFUSED = 4  # selected effects that the fit or the test did not confirm
 SIGNIFICANCE = 0.01  # family-wise
@@ -179,11 +265,11 @@ class Selection:
         """Return the same effect at other places of the same level that are nearly as good, the best first."""
         least = float(best.unseen.sum())
         most = least + NEAR * (float(self.base.sum()) - least)
-        near: dict[Key, int] = {}
+        near: dict[Where, int] = {}
         for k, (error, cause, _, _) in enumerate(self._results):
             same = (cause.effect, cause.direction.level) == (best.effect, best.direction.level)
-            if same and cause.key != best.key and error <= most:
-                near.setdefault(cause.key, k)
+            if same and cause.where != best.where and error <= most:
+                near.setdefault(cause.where, k)
         return [self._judged(k) for k in near.values()]
 
 
@@ -232,27 +318,27 @@ def invisible_effects(
     selection: Selection, causes: Sequence[Cause], known: Sequence[Cause], least_gain: float
 ) -> list[tuple[Cause, Invisible]]:
     """Return, for each place at which an effect of ordinary size would not become a cause, its best shape."""
-    places = {(term.candidate.name, term.place.joint, term.place.tendon) for cause in known for term in cause.terms}
+    places = {term.where for cause in known for term in cause.terms}
     names = [cause.effect for cause in causes]
-    best: dict[Key, tuple[float, Cause, Invisible]] = {}
+    best: dict[Where, tuple[float, Cause, Invisible]] = {}
     for cause, share in zip(selection.causes, selection.shares, strict=True):
-        if cause.direction.level != HERE or cause.key in places:
+        if cause.direction.level != HERE or cause.where in places:
             continue
         gain = selection.grams.ordinary_gain(cause.direction.mix, cause.direction.ordinary)
         needed = least_gain * names_with(cause.effect, names)
         nearness = min(share / ABSORBED, gain / max(needed, SMALLEST_GAIN))  # from 1 on it is visible
-        if cause.key not in best or nearness > best[cause.key][0]:
+        if cause.where not in best or nearness > best[cause.where][0]:
             hidden = Invisible(cause.where, cause.title, share, "", ordinary_gain=gain, needed_gain=needed)
-            best[cause.key] = (nearness, cause, hidden)
+            best[cause.where] = (nearness, cause, hidden)
     ranked = sorted(best.values(), key=lambda entry: -entry[0])
     return [(cause, hidden) for nearness, cause, hidden in ranked if nearness < 1.0]
 
 
 def absorbed_effects(selection: Selection, experiment: str) -> list[Invisible]:
     """Return, for each effect and place that refitting and background absorb, the shape that comes nearest."""
-    best: dict[Key, Invisible] = {}
+    best: dict[Where, Invisible] = {}
     for cause, share in zip(selection.causes, selection.shares, strict=True):
-        if cause.direction.level == HERE and (cause.key not in best or share > best[cause.key].surviving_share):
-            best[cause.key] = Invisible(cause.where, cause.title, share, experiment)
+        if cause.direction.level == HERE and (cause.where not in best or share > best[cause.where].surviving_share):
+            best[cause.where] = Invisible(cause.where, cause.title, share, experiment)
     ranked = sorted(best.values(), key=lambda hidden: -hidden.surviving_share)
     return [hidden for hidden in ranked if hidden.absorbed]

@@ -9,14 +9,14 @@ from dataclasses import replace
 import numpy as np
 
 from tendonfmu.arrays import Data
-from tendonfmu.diagnosis.cause import Cause, CausePlace, ChangedSize, Parameters, with_error
+from tendonfmu.diagnosis.candidate_columns import with_numbers
 from tendonfmu.diagnosis.change_search import ChangeSearch
-from tendonfmu.diagnosis.effects import BY_NAME
-from tendonfmu.diagnosis.effects.description_edit import data_number
+from tendonfmu.diagnosis.effects import BY_NAME, Place
+from tendonfmu.diagnosis.effects.candidate import data_number
 from tendonfmu.diagnosis.effects.places import thresholds
 from tendonfmu.diagnosis.effects.words import NBSP, quantity
 from tendonfmu.diagnosis.extension_fit import added_paths
-from tendonfmu.diagnosis.hypotheses import with_numbers
+from tendonfmu.diagnosis.result import Cause, CausePlace, ChangedSize, Parameters, with_error
 from tendonfmu.files import counted
 from tendonfmu.model import native
 from tendonfmu.statistics import Interval
@@ -110,11 +110,7 @@ def _new_term(
     first, terms = len(search.terms(changes[:number])), change.scaled()
     paths = added_paths(with_numbers(search.data, search.added(changes)), search.terms(changes))[first:]
     places = tuple(
-        CausePlace(
-            term.place.joint,
-            term.place.tendon,
-            {path: (data_number(now, path), units[path]) for path in added if path in units},
-        )
+        CausePlace(*term.place, {path: (data_number(now, path), units[path]) for path in added if path in units})
         for term, added in zip(terms, paths, strict=False)
     )
     main = _main([path for place in places for path in place.parameters], now)
@@ -141,10 +137,10 @@ def _other_number(search: ChangeSearch, change: Cause, then: Data, now: Data, un
     """Return the size of a number that the description has; `then` is the description of now without this change."""
     mix = change.direction.mix
     moved = np.flatnonzero(mix[mix.shape[0] - len(search.numbers) :].any(axis=1))
-    by_place: dict[tuple[int | None, int | None], dict[str, tuple[float, str]]] = {}
+    by_place: dict[Place, dict[str, tuple[float, str]]] = {}
     for k in moved:
         number = search.numbers[k]
-        own = by_place.setdefault((number.place.joint, number.place.tendon), {})
+        own = by_place.setdefault(number.place, {})
         own[number.path] = (data_number(now, number.path), units[number.path])
     places = tuple(CausePlace(*place, numbers) for place, numbers in by_place.items())
     paths = [path for place in places for path in place.parameters]

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
-from tendonfmu.arrays import Data, Flags, Numbers
-from tendonfmu.diagnosis.cause import ChangedSize, Where
+from tendonfmu.arrays import Data, Flags, Indices, Numbers
+from tendonfmu.diagnosis.effects import Where
 from tendonfmu.diagnosis.inputs import Input
 from tendonfmu.diagnosis.names import ENCODER, ZERO
+from tendonfmu.diagnosis.result import ChangedSize
 from tendonfmu.model import moment_arms
 from tendonfmu.recordings import Learned, Recording, TendonRouting, curves, held_on_the_way, smooth_speeds
 from tendonfmu.statistics import Interval, blocks_of, gain_interval, variance_between
@@ -178,3 +180,65 @@ def rows_of(recording: Recording, chosen: Flags) -> Recording:
     """Return a recording of some samples only."""
     groups = {name: values[chosen] for name, values in recording.groups.items()}
     return replace(recording, time=recording.time[chosen], groups=groups, contact=None, others={})
+
+
+# --- zeros one by one, or an encoder ----------------------------------------------------------------------------------
+# An encoder that reads δ too much makes the zero of every tendon over its joint seem off by −r δ. The fewest offsets
+# and single zeros that explain all zeros are the answer.
+
+
+AGREE = 0.05  # of what an offset does to a zero: arms are known and constant to this share
+MOST = 3  # offsets that are looked for together
+FEWEST = 2  # tendons that have to agree on an offset
+
+
+@dataclass(frozen=True)
+class Offsets:
+    """What the encoders read too much."""
+
+    joints: Indices  # from 0 [k]
+    offset: Numbers  # rad [k]
+    half: Numbers  # of the 95 % intervals [k]
+    single: Flags  # zeros [t] that no offset explains
+
+
+def encoder_offsets(off: Numbers, known_to: Numbers, arms: Numbers) -> Offsets:
+    """Explain zeros by the fewest offsets and single zeros."""
+    # off: [t] m, how far zeros are off; known_to: [t] m, less is none; arms: [t, n] m
+    joints = [int(j) for j in np.flatnonzero((arms != 0.0).sum(axis=0) >= FEWEST)]
+    sets = (chosen for count in range(min(MOST, len(joints)) + 1) for chosen in combinations(joints, count))
+    # of equally many, the fewest offsets: two zeros are no coincidence, an offset and a zero in one direction are
+    return min(_explained(off, known_to, arms, sets), key=lambda each: len(each.joints) + int(each.single.sum()))
+
+
+def offset_of(off: Numbers, known_to: Numbers, arms: Numbers) -> tuple[Numbers, Numbers]:
+    """Return the offsets [k] that fit zeros best, and halves of their intervals; arms: [t, k]."""
+    weighted = -arms / known_to[:, None]
+    inverse = np.linalg.pinv(weighted.T @ weighted)
+    return inverse @ weighted.T @ (off / known_to), np.sqrt(np.diag(inverse))
+
+
+def _explained(off: Numbers, known_to: Numbers, arms: Numbers, sets: Iterator[Sequence[int]]) -> Iterator[Offsets]:
+    for chosen in sets:
+        own, kept = arms[:, list(chosen)], np.ones(len(off), dtype=bool)
+        while ((own[kept] != 0.0).sum(axis=0) >= FEWEST).all():
+            offset, half = offset_of(off[kept], known_to[kept], own[kept])
+            beyond = np.where(kept, _beyond(off, known_to, own, offset), 0.0)
+            if beyond.max(initial=0.0) <= 1.0:
+                yield Offsets(np.array(chosen, dtype=np.intp), offset, half, ~kept)
+                break
+            # without which zero do the others agree best?
+            options = np.flatnonzero(beyond > 1.0)
+            left = [_left(off, known_to, own, kept & (np.arange(len(off)) != i)) for i in options]
+            kept[options[int(np.argmin(left))]] = False
+
+
+def _left(off: Numbers, known_to: Numbers, arms: Numbers, kept: Flags) -> float:
+    offset, _ = offset_of(off[kept], known_to[kept], arms[kept])
+    return float((_beyond(off, known_to, arms, offset)[kept] ** 2).sum())
+
+
+def _beyond(off: Numbers, known_to: Numbers, arms: Numbers, offset: Numbers) -> Numbers:
+    """Return how far each zero is from what offsets explain, in units of what is none [t]."""
+    agree = AGREE * np.abs(arms * offset).max(axis=1, initial=0.0)
+    return np.asarray(np.abs(off + arms @ offset) / np.maximum(known_to, agree))

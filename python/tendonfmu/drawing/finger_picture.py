@@ -1,7 +1,7 @@
 """Draws the icons that an FMU carries: the routing of its finger, and the signs of its terminals.
 
 The geometry of the routing comes from `model/routing_geometry.py`; the page of the FMU draws it with all names
-(`model/routing_svg.py`). Pillow does not smooth edges, so a picture is drawn three times as large and scaled down.
+(`model/routing_geometry.py`). Pillow does not smooth edges, so a picture is drawn three times as large and scaled down.
 """
 
 from __future__ import annotations

@@ -10,22 +10,21 @@ from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from . import identifiability, verdicts
-    from .core_runs import CoreRuns
-    from .estimates import known_numbers
+    from .core_runs import CoreRuns, SlowDrift, slowest_drift
     from .estimation import ESTIMATION_MISSING, HAS_ESTIMATION, EstimationError, Estimator, Unknown
-    from .evaluation import evaluate
     from .files import (
         FIT_REPORT,
         check_given_once,
         check_outputs,
         check_unseen,
+        known_numbers,
         read_previous_fit,
         with_previous_values,
         write_unfinished,
     )
     from .fisher_information import Noise, Progress, information, noise_of, sensitivities, unknowns
+    from .fit_report import FitPicture, FitSeries, LawBands, LawCurve, asymmetric, evaluate, numbers_of, unseen_square
     from .fitting import FitWarning, FrictionFit
-    from .given_numbers import unseen_square
     from .identifiability import EffectCoverage, Judgement, Verdict, counts_by_kind, coverage_of, durations, judge
     from .learning import (
         FitProgress,
@@ -42,8 +41,6 @@ if TYPE_CHECKING:
     from .memory_fit import MemoryProblem, minimise
     from .memory_methods import guess_prior
     from .methods import learn_batch
-    from .picture import FitPicture, FitSeries, LawBands, LawCurve, asymmetric, numbers_of
-    from .slow_drift import SlowDrift, slowest_drift
     from .structure import (
         MAGNITUDES,
         SCALING,

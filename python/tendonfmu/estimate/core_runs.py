@@ -13,12 +13,15 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
+from scipy import sparse
 
-from tendonfmu.arrays import Data, Flags, Indices, Numbers
+from tendonfmu.arrays import Array, Data, Flags, Indices, Numbers
 from tendonfmu.model import INPUTS_OF_SOURCE, native, number_of, without_learning
 from tendonfmu.recordings import FitRecording, Grid, Segment, make_grid
+from tendonfmu.statistics import Span, spline_basis
 
 RATE = 400.0  # Hz; the samples of faster recordings are averaged, but not below this rate
 SETTLED = 1.0, 0.05  # s, and share of a stretch: until then what friction remembers is still unknown,
@@ -36,23 +39,7 @@ class Stretch:
 
 
 class CoreRuns:
-    """Runs of a finger over recordings, whose numbers are set by path.
-
-    Attributes
-    ----------
-    grid
-        The blocks, B in all.
-    used
-        [B] whether a block may be learned from.
-    stretch
-        [B] the stretch without a gap that a block belongs to, from 0.
-    time, still
-        [B] centre of each block (s), and whether all joints stand still in it and its torque counts.
-    stretches
-        The stretches without a gap, thinned.
-    torque, speed
-        [B, n] torque to explain (N·m), and joint speeds (rad/s).
-    """
+    """Runs of a finger over recordings, whose numbers are set by path."""
 
     def __init__(
         self,
@@ -68,10 +55,10 @@ class CoreRuns:
         self.grid = make_grid(recordings) if grid is None else grid
         segments = self.grid.segments
         self.stretches = [_stretch(recordings[segment.recording], segment, rate) for segment in segments]
-        self.used: Flags = np.concatenate(
-            [_used(recordings[each.recording], each, self.grid.step) for each in segments]
-        )
+        used = [_used(recordings[each.recording], each, self.grid.step) for each in segments]
+        self.used: Flags = np.concatenate(used)  # blocks that may be learned from [B]
         self.stretch: Indices = np.repeat(np.arange(len(segments)), [segment.count for segment in segments])
+        # the stretch without a gap that each block belongs to, its centre (s), and joint speeds (rad/s)
         self.time: Numbers = self.grid.means([recording.time for recording in recordings])
         self.speed: Numbers = self.grid.means([recording.model.joint_speed for recording in recordings])
         fastest = self.grid.means([np.abs(recording.model.joint_speed) for recording in recordings])
@@ -186,3 +173,87 @@ def _used(recording: FitRecording, segment: Segment, step: float) -> Flags:
     longest, share = SETTLED
     used[: int(max(min(longest / step, share * segment.count), _turned(recording, segment, step)))] = False
     return np.asarray(used)
+
+
+# --- what is not judged of a torque -----------------------------------------------------------------------------------
+# A learning bias would follow everything slow, such as a missing cover or weight. A drift, of a sensor's zero or a
+# temperature, shows while all joints stand still: there neither friction nor position-dependent torque changes much.
+
+
+DRIFT_KNOTS = (60.0, 30.0, 15.0)  # s, of a drift; the slowest that is enough is used
+SHORTEST_REST = 0.3  # s, of a rest
+FEWEST_RESTS = 12  # rests, for a drift to show
+CLEARLY = 2.0  # standard errors of the mean fall of the rests' squared errors
+
+
+class SlowDrift:
+    """The constant, or the splines, of each joint and stretch."""
+
+    def __init__(self, time: Numbers, stretch: Indices, used: Flags, knots: float = np.inf) -> None:
+        """Make the basis. time: [B] (s); stretch: [B]; used: [B]; knots: s, inf for constants."""
+        self.knots, self.used = knots, used
+        self.basis = sparse.csr_array(sparse.block_diag(_bases(time, stretch, knots), format="csr"))  # [B, s]
+        self._span = Span(self.basis[used])
+
+    def without(self, values: Array) -> Numbers:
+        """Return the used rows of values [B, n, ...] without their constant or drift, [R, n, ...]."""
+        rows = values[self.used]
+        return self._span.without(rows.reshape(len(rows), -1)).reshape(rows.shape) if rows.size else rows
+
+
+def _bases(time: Numbers, stretch: Indices, knots: float) -> list[Numbers]:
+    pieces = [time[stretch == number] for number in np.unique(stretch)]
+    return [_basis(piece, piece, knots) for piece in pieces]
+
+
+def _basis(time: Numbers, stretch: Numbers, knots: float) -> Numbers:
+    """Return [K, s] a constant or splines at times [K] of a stretch with the times [B] (s)."""
+    span = float(stretch[-1] - stretch[0])
+    if span < knots:
+        return np.ones((len(time), 1))
+    inside = np.clip(time, stretch[0], stretch[-1])
+    first = np.concatenate([stretch[:1], inside])
+    return np.asarray(spline_basis(first, span, knots).todense())[1:]
+
+
+def slowest_drift(residual: Numbers, time: Numbers, stretch: Indices, used: Flags, still: Flags) -> SlowDrift:
+    """Return the slowest drift that the rests demand.
+
+    residual: [B, n] (N·m); time: [B] (s); stretch, used: [B]; still: [B] whether all joints stand still.
+    """
+    rests = _rests(time, stretch, still)
+    best = np.inf
+    if len(rests) >= FEWEST_RESTS:
+        scale = np.maximum(residual[used].std(axis=0), 1e-12)
+        means = np.array([residual[rest].mean(axis=0) for rest in rests]) / scale
+        centres = np.array([time[rest].mean() for rest in rests])
+        number = np.array([stretch[rest.start] for rest in rests])
+        error = _left_out(means, centres, number, time, stretch, np.inf)
+        for knots in DRIFT_KNOTS:
+            other = _left_out(means, centres, number, time, stretch, knots)
+            fall = error - other
+            if fall.mean() > CLEARLY * fall.std(ddof=1) / np.sqrt(len(fall)):
+                best, error = knots, other
+    return SlowDrift(time, stretch, used, best)
+
+
+def _rests(time: Numbers, stretch: Indices, still: Flags) -> list[slice]:
+    bounds = np.flatnonzero(
+        np.diff(still, prepend=False, append=False) | np.append(np.diff(stretch, prepend=0) != 0, False)
+    )
+    runs = [slice(int(a), int(b)) for a, b in pairwise(bounds) if still[a]]
+    return [run for run in runs if time[run.stop - 1] - time[run.start] >= SHORTEST_REST]
+
+
+def _left_out(
+    means: Numbers, centres: Numbers, number: Indices, time: Numbers, stretch: Indices, knots: float
+) -> Numbers:
+    """Return [r] the squared error of each rest's mean [r, n], predicted from the others of its stretch."""
+    errors = np.zeros(len(means))
+    for own in np.unique(number):
+        rows = number == own
+        basis = _basis(centres[rows], time[stretch == own], knots)
+        hat = basis @ np.linalg.pinv(basis, rcond=1e-8)
+        free = np.maximum(1.0 - np.diag(hat), 1e-3)
+        errors[rows] = np.sum(((means[rows] - hat @ means[rows]) / free[:, None]) ** 2, axis=1)
+    return errors

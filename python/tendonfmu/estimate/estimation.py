@@ -126,14 +126,12 @@ class Estimator:
         return np.array([unknown.scale for unknown in self.unknowns])
 
     def values(self, z: Array) -> Numbers:
-        """Convert unknowns within their bounds into the numbers of the description."""
-        # z: [u]; returns [p] numbers of the description, in its units
+        """Convert unknowns [u] within their bounds into the numbers of the description [p]."""
         with _refusals():
             return np.asarray(self._estimator.values(_matrix(z)))
 
     def unknown_values(self, parameters: Array) -> Numbers:
-        """Convert numbers of the description into unknowns."""
-        # parameters: [p]; returns [u] unknowns
+        """Convert numbers of the description [p] into unknowns [u]."""
         with _refusals():
             return np.asarray(self._estimator.unknown_values(_matrix(parameters)))
 
@@ -157,20 +155,17 @@ class Estimator:
             )
 
     def set_weights(self, recording: int, weight: Array) -> None:
-        """Let each sample of a recording count as a part of a sample in `evaluate` and `fit`."""
-        # weight: [n]
+        """Let each sample of a recording count as a part of a sample, by joint [n], in `evaluate` and `fit`."""
         with _refusals():
             self._estimator.set_weights(recording, np.ascontiguousarray(weight, dtype=np.float64))
 
     def set_known(self, information: Array) -> None:
-        """Set the information of an earlier fit, which `fit` adds to its prior."""
-        # information: [u, u]
+        """Set the information [u, u] of an earlier fit, which `fit` adds to its prior."""
         with _refusals():
             self._estimator.set_known(np.ascontiguousarray(information, dtype=np.float64))
 
     def evaluate(self, z: Array, stride: int = 1, threads: int = 0) -> tuple[float, Numbers, Numbers]:
-        """Compute cost, gradient and information of the data at z, without the prior."""
-        # z: [u]; returns [u] derivative of the cost, [u, u] Fisher information
+        """Compute cost, gradient [u] and Fisher information [u, u] of the data at z [u], without the prior."""
         with _refusals():
             cost, gradient, information = self._estimator.evaluate(_matrix(z), stride, threads)
         return float(cost), np.asarray(gradient), np.asarray(information)
@@ -209,8 +204,7 @@ class Estimator:
         stride: int = 0,
         progress: BatchWatch | None = None,
     ) -> BatchResult:
-        """Maximise the likelihood under a Gaussian prior about the numbers of the description."""
-        # start: [u]
+        """Maximise the likelihood under a Gaussian prior about the numbers of the description, from a start [u]."""
         begun = perf_counter()
         first = self.start if start is None else start
         with _refusals():
@@ -282,7 +276,6 @@ class Learner:
         progress: LearnerWatch | None = None,
     ) -> dict[str, Numbers]:
         """Learn from a recording; the bias starts anew."""
-        # returns [N, n] [N, n] (N·m)
         with _refusals():
             innovation, variance, _ = self._learner.run(
                 **_samples(arrays),

@@ -232,7 +232,6 @@ class Noise:
 def noise_of(data: Mapping[str, Any], sample_time: float) -> Noise:
     """Return the noise of a description's `bias`, with its defaults."""
     # A finger without noise gets the default noise_std; otherwise every number would be identifiable.
-    # sample_time: (s)
     bias = data.get("bias") or {}
     std, per_force = (number_of(data, f"bias.{key}") for key in ("noise_std", "noise_std_per_force"))
     initial = bias.get("initial_variance")

@@ -2,20 +2,66 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tendonfmu.arrays import Numbers
-from tendonfmu.estimate.evaluation import Evaluation, residual_entry
+from tendonfmu.arrays import Data, Numbers
+from tendonfmu.estimate.core_runs import CoreRuns, SlowDrift
+from tendonfmu.estimate.estimation import Unknown
 from tendonfmu.estimate.files import FIT_REPORT
 from tendonfmu.estimate.learning import Learned, unknown_names
-from tendonfmu.estimate.verdicts import Fitted
+from tendonfmu.estimate.verdicts import CAUSES, Fitted
 from tendonfmu.files import counted, finite
-from tendonfmu.model import Finger, native
-from tendonfmu.recordings import consistency, whiteness
+from tendonfmu.model import Effect, Finger, Instance, Law, native, without_friction
+from tendonfmu.recordings import FitRecording, Model, consistency, rms, whiteness
 from tendonfmu.statistics import effective_samples
+
+# --- one recording under a finger -------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """A recording under the fitted finger."""
+
+    recording: FitRecording  # prepared recording
+    model: Model  # of the fitted finger, and of that of the start
+    start: Model
+    bias_only: Model  # with the same bias filter and no friction at all
+    model_only: Numbers  # [N, n] y − T less a constant per part (N·m)
+
+
+def evaluate(start: Data, fitted: Data, recording: FitRecording) -> Evaluation:
+    """Judge a fitted finger on a recording."""
+    model = recording.run(fitted)
+    rest = recording.target - model.torque
+    for part in recording.parts:
+        chosen = recording.train[part] if recording.train[part].any() else recording.tracked[part]
+        if chosen.any():
+            rest[part] -= rest[part][chosen].mean(axis=0)
+    return Evaluation(recording, model, recording.run(start), recording.run(without_friction(fitted)), rest)
+
+
+def residual_entry(evaluations: Sequence[Evaluation], which: str) -> dict[str, list[float]] | None:
+    """Compute the rms [n] by joint over the samples of a flag ("train" or "held_out"); None without any."""
+    chosen = [np.asarray(getattr(evaluation.recording, which)) for evaluation in evaluations]
+    if not any(flags.any() for flags in chosen):
+        return None
+    unknown = np.isnan(np.concatenate([evaluation.model.residual for evaluation in evaluations])).any(axis=1)
+    flags = np.concatenate(chosen) & ~unknown
+    series = {
+        "rms": [evaluation.model.residual for evaluation in evaluations],
+        "start_rms": [evaluation.start.residual for evaluation in evaluations],
+        "bias_only_rms": [evaluation.bias_only.residual for evaluation in evaluations],
+        "model_only_rms": [evaluation.model_only for evaluation in evaluations],
+        "torque_rms": [evaluation.recording.target for evaluation in evaluations],
+    }
+    return {name: rms(np.concatenate(values), flags) for name, values in series.items()}
+
 
 LEAST_NIS, MOST_NIS, MOST_LAG_ONE = 0.5, 2.0, 0.3  # values outside give a warning
 _MORE_PASSES = ": allow more (--passes), or estimate fewer numbers (--only, --fix, --share)"
@@ -142,3 +188,217 @@ def noise_sentences(innovations: Mapping[str, Any]) -> list[str]:
             f"effect, or the noise is correlated; {count}, treat the standard errors with caution"
         )
     return sentences
+
+
+# --- the given numbers ------------------------------------------------------------------------------------------------
+
+
+FAR, MOST_NAMED = 2.0, 4  # a factor by which a number moves far, and such numbers named at most
+
+
+def unseen_square(data: Data, recordings: Sequence[FitRecording]) -> float:
+    """Return Σ r² over the samples held out and all joints, (N·m)², without a learning bias; 0 without any."""
+    unseen = [replace(recording, train=recording.held_out) for recording in recordings if recording.held_out.any()]
+    if not unseen:
+        return 0.0
+    runs = CoreRuns(data, unseen)
+    return float(np.sum(SlowDrift(runs.time, runs.stretch, runs.used).without(runs.residual()) ** 2))
+
+
+def is_worse(training: Sequence[Evaluation]) -> bool:
+    """Return whether fitted numbers leave more of the samples held out than the given ones."""
+    held = residual_entry(training, "held_out")
+    return held is not None and float(np.sum(np.square(held["rms"]))) > float(np.sum(np.square(held["start_rms"])))
+
+
+def movement(numbers: Sequence[Fitted], estimated: bool, kept: bool) -> dict[str, Any]:
+    """Return how many numbers moved, which stayed, and why, for the report."""
+    moved = [number for number in numbers if abs(number.value - number.start) > number.standard_error]
+    stayed = [number for number in numbers if abs(number.value - number.start) <= number.standard_error]
+    return {
+        "start": "estimated" if estimated else "guessed",
+        "kept": kept,
+        "moved": len(moved),
+        "stayed": [number.number.path for number in stayed],
+        "paragraph": " ".join([*_sentences(len(moved), stayed, estimated, kept), *_far(moved)]),
+    }
+
+
+def _far(moved: Sequence[Fitted]) -> list[str]:
+    """Name the numbers that moved by more than a factor, the farthest first."""
+    ratios = [
+        (max(number.value / number.start, number.start / number.value), number)
+        for number in moved
+        if number.start > 0.0 and number.value > 0.0 and abs(number.value - number.start) > 3.0 * number.standard_error
+    ]
+    far = sorted((each for each in ratios if each[0] > FAR), key=lambda each: -each[0])
+    if not far:
+        return []
+    named = [f"{each.number.path} {each.start:.3g} → {each.value:.3g}" for _, each in far[:MOST_NAMED]]
+    more = f" and {len(far) - MOST_NAMED} more" if len(far) > MOST_NAMED else ""
+    return [f"Moved by more than a factor of {FAR:g}: {'; '.join(named)}{more}."]
+
+
+def _sentences(moved: int, stayed: Sequence[Fitted], estimated: bool, kept: bool) -> list[str]:
+    if kept:
+        return ["The given numbers are kept: fitted ones leave a larger error on the held-out samples."]
+    sentences = ["The given numbers were estimated before."] if estimated else []
+    sentences.append(f"{counted(moved, 'number')} moved by more than their standard errors")
+    reasons = Counter(number.cause for number in stayed)
+    why = [f"{count}: {CAUSES[cause]}" for cause, count in reasons.most_common() if cause]
+    if reasons[""]:
+        why.append(f"{reasons['']}: the data agree with the given value{'s' * (reasons[''] > 1)}")
+    sentences[-1] += f"; {len(stayed)} stayed ({'; '.join(why)})." if stayed else "."
+    return sentences
+
+
+# --- pictures ---------------------------------------------------------------------------------------------------------
+# There is one `FitSeries` per recording: those trained on (role "training"; held-out blocks of time have `used` False),
+# and whole recordings that were held out or given to compare with (role "comparison", such as the motion at four times
+# the pretension).
+
+
+Role = Literal["training", "comparison"]
+CONFIDENCE = 1.96  # standard errors: 95 %
+_LAST = {"coulomb": "coulomb", "drop": "static", "rate": "stribeck_velocity", "viscous": "viscous", "static": "coulomb"}
+
+
+@dataclass(frozen=True)
+class FitSeries:
+    """One recording under the fitted model; all arrays have one row per sample, in SI units."""
+
+    label: str  # name for people, such as "free motion" or the name of the file
+    role: Role  # "training" or "comparison"
+    mean_force: float  # mean of all tendon forces over all samples (N)
+    time: Numbers  # [N] (s)
+    torque: Numbers  # [N, n] torque that the model has to explain: τ, or τ − external_torque where that was used (N·m)
+    # [N, n] τ − T_eff before the bias update (`Estimator.innovations(...)[0]`); NaN for the first sample (N·m)
+    residual: Numbers
+    model_torque: Numbers  # [N, n] T of eq. (10) (N·m)
+    joint_angle: Numbers  # [N, n] the kinematics in use (rad, rad/s)
+    joint_speed: Numbers
+    used: NDArray[np.bool_]  # [N] bool: trained on
+    held_out: NDArray[np.bool_] | None = None  # [N] bool: held out of training and judged
+
+
+@dataclass(frozen=True)
+class FitPicture:
+    """A finished fit: all that its figures and its page are made of."""
+
+    # "tendonfmu-fit-1" as written by `--report`. If residual.train and residual.held_out have "start_rms" [n] beside
+    # "rms" (the residual with the parameters of the start), it is shown
+    report: Mapping[str, Any]
+    start: Finger
+    fitted: Finger
+    unknowns: Sequence[Unknown]  # [p] unknowns of the estimation
+    z: Numbers  # [p] their estimate
+    covariance: Numbers  # [p, p] of z, prior included
+    series: Sequence[FitSeries]  # recordings, training first, in the order given
+
+
+# --- laws with their confidence bands ---------------------------------------------------------------------------------
+#
+# A curve runs over velocity, or over the angle where a law has working points. The band is 1.96 standard errors of the
+# curve, by the delta method in the unknowns of the fit (coulomb, drop = static − coulomb, rate = 1/stribeck_velocity,
+# viscous). The curve is exactly linear in all but the rate. The band is cut off at 0, since friction is not negative.
+
+
+@dataclass(frozen=True)
+class LawCurve:
+    """Friction of one side of a law, with its confidence band."""
+
+    fitted: Numbers  # [N] friction with the fitted numbers, in the unit of the law
+    low: Numbers  # [N] ends of the band
+    high: Numbers
+    start: Numbers  # [N] friction with the numbers of the start
+
+
+def side_of(law: Law, sign: int) -> Law:
+    """Return the side of a law for a direction of sliding, +1 or −1."""
+    if law.get("positive") is None:
+        return law
+    side: Law = law["positive" if sign > 0 else "negative"]
+    return side
+
+
+def side_path(path: str, law: Law, sign: int) -> str:
+    """Return the path of that side: the law's own path if it is symmetric."""
+    if law.get("positive") is None:
+        return path
+    return f"{path}.{'positive' if sign > 0 else 'negative'}"
+
+
+def magnitude(side: Law, speed: Numbers) -> Numbers:
+    """Compute |F| at the speeds |v| by eq. (1)."""
+    drop = float(side["static"]) - float(side["coulomb"])
+    viscous = float(side.get("viscous") or 0.0)
+    return np.asarray(side["coulomb"] + drop * np.exp(-speed / side["stribeck_velocity"]) + viscous * speed)
+
+
+def slopes(side: Law, speed: Numbers) -> Mapping[str, Numbers]:
+    """Compute the derivatives [N] of |F| by the unknowns, by role."""
+    drop, decay = float(side["static"]) - float(side["coulomb"]), np.exp(-speed / side["stribeck_velocity"])
+    one = np.ones_like(speed)
+    return {"coulomb": one, "static": one, "drop": decay, "rate": -drop * speed * decay, "viscous": speed}
+
+
+class LawBands:
+    """Curves of the laws of a fit, with their confidence bands."""
+
+    def __init__(self, picture: FitPicture) -> None:
+        parameters = Instance(picture.fitted.image).parameters()
+        paths = [parameter.path for parameter in parameters]
+        self._covariance = np.asarray(picture.covariance)
+        self._column = {
+            (paths[k], unknown.role): column
+            for column, unknown in enumerate(picture.unknowns)
+            for k in unknown.parameters
+        }
+
+    def over_speed(self, start: Effect, fitted: Effect, sign: int, speed: Numbers) -> LawCurve:
+        """Compute the curve of an effect with a single law over speed. speed: [N]; returns [N] each."""
+        weights = np.ones((len(speed), 1))
+        return self._curve(start, fitted, sign, speed, weights)
+
+    def over_angle(self, start: Effect, fitted: Effect, sign: int, speed: float, angle: Numbers) -> LawCurve:
+        """Compute the curve of an effect with working points over the angle, at one speed."""
+        # angle: [N] (rad); returns [N] each
+        unit = np.eye(len(fitted.angles))
+        weights = np.column_stack([np.interp(angle, fitted.angles, row) for row in unit])
+        return self._curve(start, fitted, sign, np.full_like(angle, speed), weights)
+
+    def _curve(self, start: Effect, fitted: Effect, sign: int, speed: Numbers, weights: Numbers) -> LawCurve:
+        value = _mixed(fitted, sign, speed, weights)
+        error = self._standard_error(fitted, sign, speed, weights)
+        low, high = value - CONFIDENCE * error, value + CONFIDENCE * error
+        return LawCurve(value, np.maximum(low, 0.0), high, _mixed(start, sign, speed, weights))
+
+    def _standard_error(self, effect: Effect, sign: int, speed: Numbers, weights: Numbers) -> Numbers:
+        gradients: dict[int, Numbers] = {}  # column of z -> [N]; the slopes of laws that share a value add up
+        for share, law, path in zip(weights.T, effect.laws, effect.law_paths, strict=True):
+            prefix = side_path(path, law, sign)
+            for role, slope in slopes(side_of(law, sign), speed).items():
+                column = self._column.get((f"{prefix}.{_LAST[role]}", role))
+                if column is not None:
+                    gradients[column] = gradients.get(column, np.zeros_like(speed)) + share * slope
+        if not gradients:
+            return np.zeros_like(speed)
+        columns = np.array(list(gradients))
+        slope = np.column_stack(list(gradients.values()))
+        variance = np.einsum("ki,ij,kj->k", slope, self._covariance[np.ix_(columns, columns)], slope)
+        return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+
+
+def _mixed(effect: Effect, sign: int, speed: Numbers, weights: Numbers) -> Numbers:
+    values = [magnitude(side_of(law, sign), speed) for law in effect.laws]
+    return np.asarray(np.sum(weights * np.column_stack(values), axis=1))
+
+
+def asymmetric(effect: Effect) -> bool:
+    """Tell whether any law of an effect has two sides."""
+    return any(law.get("positive") is not None for law in effect.laws)
+
+
+def numbers_of(effect: Effect, report: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Return the entries of the report for the estimated numbers of an effect."""
+    return [entry for entry in report["parameters"] if entry["path"].startswith(f"{effect.path}.")]

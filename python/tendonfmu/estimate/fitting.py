@@ -15,8 +15,6 @@ import numpy as np
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
-from tendonfmu.estimate.estimates import with_estimates
-from tendonfmu.estimate.evaluation import Evaluation, evaluate
 from tendonfmu.estimate.files import (
     PreviousFit,
     Unfinished,
@@ -24,15 +22,25 @@ from tendonfmu.estimate.files import (
     estimated_numbers,
     read_previous_fit,
     resumed_start,
+    with_estimates,
     with_previous_values,
 )
-from tendonfmu.estimate.fit_report import build_report, fit_sentences, noise_sentences
-from tendonfmu.estimate.given_numbers import is_worse, movement, unseen_square
+from tendonfmu.estimate.fit_report import (
+    Evaluation,
+    FitPicture,
+    FitSeries,
+    build_report,
+    evaluate,
+    fit_sentences,
+    is_worse,
+    movement,
+    noise_sentences,
+    unseen_square,
+)
 from tendonfmu.estimate.identifiability import EffectCoverage, coverage_of, with_laws_of
 from tendonfmu.estimate.learning import FrictionFitOptions, Interrupted, Learned, Watch, settings_of, unknown_names
+from tendonfmu.estimate.memory_choice import Remembered, learn_remembered
 from tendonfmu.estimate.methods import learn_batch, learn_ekf
-from tendonfmu.estimate.picture import FitPicture, FitSeries
-from tendonfmu.estimate.remembered import Remembered, learn_remembered
 from tendonfmu.estimate.structure import Choice, build_structure, torque_scales, with_values
 from tendonfmu.estimate.verdicts import Fitted, judge_numbers, sizes_of
 from tendonfmu.model import Finger, FingerSource, description_text, number_of, read_finger

@@ -141,8 +141,7 @@ class Judgement:
 
 
 def judge(numbers: Sequence[Unknown], information: Numbers, coverage: Sequence[EffectCoverage]) -> Judgement:
-    """Judge which numbers a motion identifies."""
-    # information: [p, p]
+    """Judge which numbers a motion identifies. information: [p, p]."""
     if not numbers:
         return Judgement([], 0, [])
     known = information + np.eye(len(numbers)) / PRIOR**2
@@ -157,8 +156,7 @@ def judge(numbers: Sequence[Unknown], information: Numbers, coverage: Sequence[E
 def explain(
     numbers: Sequence[Unknown], error: Numbers, alone: Numbers, correlation: Numbers, coverage: Sequence[EffectCoverage]
 ) -> list[Verdict]:
-    """Explain for each number whether it is identifiable."""
-    # error, alone: [p]; correlation: [p, p]
+    """Explain for each number whether it is identifiable. error, alone: [p]; correlation: [p, p]."""
     by_path = {cover.effect.path: cover for cover in coverage}
     verdicts = []
     for k, number in enumerate(numbers):

@@ -1,6 +1,6 @@
 """The fit of a finger whose friction remembers: all numbers together, by runs of the core, without a learning bias.
 
-The residual of joint j is r = τ − T less its constant or slowest drift (`slow_drift`), as block means, with the mean
+The residual of joint j is r = τ − T less its constant or slowest drift (`SlowDrift`), as block means, with the mean
 square Q_j. Its variance is s²·p_j with unknown s and given p_j, so the negative log likelihood is
 ½ N log Σ_j (N_j/N)·Q_j(u)/p_j, with N_j the effective number of blocks and N their sum, plus the prior
 ½ (u − u_0)ᵀ P (u − u_0). With p_j = 1 no joint is fitted at the cost of another; `reweighted` sets p_j = Q_j near the
@@ -10,6 +10,7 @@ of the Gauss-Newton matrix within them. Numbers of the memory are fitted as thei
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
@@ -18,12 +19,41 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from tendonfmu.arrays import Flags, Numbers
-from tendonfmu.estimate.core_runs import CoreRuns
+from tendonfmu.estimate.core_runs import CoreRuns, SlowDrift
 from tendonfmu.estimate.estimation import Estimator
-from tendonfmu.estimate.law_slopes import LawSlopes
 from tendonfmu.estimate.memory import memory_paths
-from tendonfmu.estimate.slow_drift import SlowDrift
 from tendonfmu.estimate.structure import FIXED, Structure
+from tendonfmu.model import native
+
+# --- derivatives by the numbers of laws -------------------------------------------------------------------------------
+# The core takes the share of its limit that friction with a memory holds as constant, which is exact for what slips and
+# near for what does not. Numbers of the memory and of other extensions have none here.
+
+
+class LawSlopes:
+    """The derivatives over some runs."""
+
+    def __init__(self, structure: Structure, runs: CoreRuns) -> None:
+        data = structure.start.data
+        bias = {**(data.get("bias") or {}), "noise_std": 1.0, "forget_rate": 0.0}  # as runs have it
+        image = native.image_from_json(json.dumps({**data, "bias": bias}))
+        self._estimator, self._blocks = Estimator(image, structure.group, structure.scale), runs.grid.blocks
+        self._stretches = []
+        for stretch in runs.stretches:
+            number = self._estimator.add_recording(stretch.arrays, stretch.kinematics)
+            self._stretches.append((number, len(stretch.arrays["time"]), stretch.segment))
+
+    def at(self, z: Numbers) -> Numbers:
+        """Return [B, n, u] the derivatives of τ − T less the jumps by the unknowns z [u] (N·m each)."""
+        slopes = np.empty((self._blocks, self._estimator.joints, len(z)))
+        for number, samples, segment in self._stretches:
+            length = samples // segment.count
+            _, _, by_torque, by_jump = self._estimator.jacobian(number, z, 0, samples, length)
+            if by_jump.any():
+                by_torque += length * (np.cumsum(by_jump, axis=0) - 0.5 * by_jump)
+            np.negative(by_torque, out=slopes[segment.blocks])
+        return slopes
+
 
 STEP = 1e-4  # of a coordinate: far above rounding, far below what moves many samples across a limit
 BLOCKS, SHORTEST, FEWEST = 60, 2.0, 8  # stretches of scores: how many, and least length (s) and number

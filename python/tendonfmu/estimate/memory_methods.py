@@ -15,13 +15,23 @@ from dataclasses import replace
 import numpy as np
 
 from tendonfmu.arrays import Numbers
-from tendonfmu.estimate.core_runs import RATE, CoreRuns
+from tendonfmu.estimate.core_runs import RATE, CoreRuns, SlowDrift, slowest_drift
 from tendonfmu.estimate.estimation import Estimator
-from tendonfmu.estimate.learning import FitProgress, Interrupted, Learned, MemoryEvidence, Settings, Watch
+from tendonfmu.estimate.learning import (
+    GUESS,
+    FitProgress,
+    Interrupted,
+    Learned,
+    MemoryEvidence,
+    Prior,
+    Settings,
+    Watch,
+    inverse,
+    most_likely,
+    posterior_factor,
+)
 from tendonfmu.estimate.memory import starts
 from tendonfmu.estimate.memory_fit import MemoryProblem, Minimum, State, minimise
-from tendonfmu.estimate.prior import GUESS, Prior, inverse, most_likely, posterior_factor
-from tendonfmu.estimate.slow_drift import SlowDrift, slowest_drift
 from tendonfmu.estimate.structure import Structure
 from tendonfmu.recordings import FitRecording, Grid, Segment, make_grid
 from tendonfmu.statistics import sample_weights
@@ -275,7 +285,6 @@ def learned_of(
         passes=passes,
         converged=last.converged,
         weights=weights,
-        innovations=[],
         warnings=[] if last.converged else [f"not converged after {passes} steps"],
         memory=MemoryEvidence(problem, last),
     )

@@ -21,17 +21,20 @@ from tendonfmu.errors import InputError, NothingLeftError
 from tendonfmu.estimate.core_runs import image_that_holds
 from tendonfmu.estimate.estimation import BatchResult, EstimationError, Estimator, Learner
 from tendonfmu.estimate.learning import (
+    GUESS,
     FitProgress,
     FrictionFitOptions,
     Interrupted,
     Learned,
+    Prior,
     Settings,
     Watch,
+    inverse,
+    most_likely,
     unknown_names,
 )
 from tendonfmu.estimate.memory import has_memory
 from tendonfmu.estimate.memory_methods import learn_with_memory, learned_with_memory_at, stroke_time
-from tendonfmu.estimate.prior import GUESS, Prior, inverse, most_likely
 from tendonfmu.estimate.structure import Structure, with_values
 from tendonfmu.files import counted
 from tendonfmu.recordings import FitRecording
@@ -104,8 +107,7 @@ def _measured_weights(
 def learn_batch(
     structure: Structure, recordings: Sequence[FitRecording], watch: Watch, settings: Settings, start: Start | None
 ) -> Learned:
-    """Estimate by maximum likelihood."""
-    # start: [u]
+    """Estimate by maximum likelihood. start: [u]."""
     estimator = _estimator(structure, recordings)
     begin = _starting_point(estimator, start)
     if structure.needs_runs:
@@ -143,7 +145,6 @@ def learn_batch(
         passes=passes,
         converged=result.converged,
         weights=weights,
-        innovations=[],
         warnings=[]
         if result.converged
         else [f"not converged after {counted(result.passes, 'pass', 'passes')} over the data"],
@@ -172,18 +173,11 @@ def learned_at(structure: Structure, recordings: Sequence[FitRecording]) -> Lear
         passes=1,
         converged=True,
         weights=weights,
-        innovations=[],
-        warnings=[],
     )
 
 
 def _fitted(
-    estimator: Estimator,
-    begin: Numbers,
-    prior: Numbers,
-    settings: Settings,
-    watch: Watch,
-    what: str,
+    estimator: Estimator, begin: Numbers, prior: Numbers, settings: Settings, watch: Watch, what: str
 ) -> BatchResult:
     """Fit from `begin` [u]. `what` is added to the words of each phase. Raises Interrupted."""
     best, best_cost = begin, float("nan")
@@ -209,10 +203,6 @@ def _fitted(
     if watch.stopped or result.stopped:
         raise Interrupted(estimator, result.z, result.cost, watch.by_user)
     return result
-
-
-def _slack(samples: int) -> str:
-    return f"the filter did not learn from {counted(samples, 'sample')} in which the model found a tendon slack"
 
 
 def learn_ekf(
@@ -263,7 +253,9 @@ def learn_ekf(
         converged=True,
         weights=weights,
         innovations=innovations,
-        warnings=[_slack(learner.slack_samples)] if learner.slack_samples else [],
+        warnings=[f"the filter did not learn from {counted(slack, 'sample')} in which the model found a tendon slack"]
+        if (slack := learner.slack_samples)
+        else [],
     )
 
 

@@ -148,8 +148,7 @@ def _initial_torques(data: Mapping[str, Any]) -> list[Unknown]:
 
 
 def with_values(structure: Structure, values: Numbers) -> Finger:
-    """Replace the estimated numbers in the description of the start."""
-    # values: [p]
+    """Replace the estimated numbers in the description of the start. values: [p]."""
     data = own_copy(structure.start.data)
     for number in structure.numbers:
         for path in (number.path, number.with_path):
@@ -348,7 +347,6 @@ def _with_equal_values(data: Mapping[str, Any], numbers: Sequence[Unknown], owne
 
 def set_number(data: Any, path: str, value: float) -> None:
     """Set a number of a parsed description in place."""
-    # path: [1]
     *way, last = steps_of(path)
     for step in way:
         data = data[step]
@@ -367,7 +365,6 @@ def _value(data: Any, path: str) -> float:
 
 def get_number(data: Any, path: str) -> Any:
     """Return a number of a parsed description."""
-    # path: [1]
     for step in steps_of(path):
         data = data[step]
     return data

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tendonfmu.arrays import Numbers
-from tendonfmu.estimate.estimates import with_estimates
 from tendonfmu.estimate.estimation import Estimator
 from tendonfmu.estimate.estimation import Unknown as FittedUnknown
+from tendonfmu.estimate.files import with_estimates
 from tendonfmu.estimate.fisher_information import Unknown, unknowns
 from tendonfmu.estimate.identifiability import CAUSES as CAUSES_OF_A_MOTION
 from tendonfmu.estimate.identifiability import LIMIT, PRIOR, EffectCoverage, Verdict, explain, unvisited

@@ -1,8 +1,8 @@
 """Models of MuJoCo (MJCF): a finger description made from one, and fitted numbers written back into one.
 
-Only `compiled_model` calls MuJoCo. `finger_parts` reads tendons, moment arms, links and their weight, and
-`finger_import` makes a description of them and lists what it cannot hold. The way back: `number_export` decides what
-MJCF can express, `xml_source` changes the XML.
+Only `compiled_model` calls MuJoCo, and reads and changes the XML. `finger_parts` reads tendons, moment arms, links and
+their weight, and `finger_import` makes a description of them and lists what it cannot hold. The way back:
+`number_export` decides what MJCF can express.
 """
 
 from typing import TYPE_CHECKING

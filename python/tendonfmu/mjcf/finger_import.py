@@ -179,8 +179,7 @@ def _carries(model: CompiledModel, base: Joint, other: Joint) -> bool:
 def joint_ranges(
     model: CompiledModel, joints: Sequence[Joint], given: Mapping[str, tuple[float, float]]
 ) -> tuple[Numbers, list[str]]:
-    """Return the ranges of joints."""
-    # given: (rad); returns [n, 2] (rad)
+    """Return the ranges of joints [n, 2] (rad)."""
     names = [joint.name for joint in joints]
     for name in given:
         if name not in names:
@@ -248,14 +247,9 @@ def _tendon_rows(
             if arm.slope:
                 yield {"effect": "moment_arm_variation", "joint": j + 1, "tendon": i + 1, "slope": arm.slope}
     for i, tendon in enumerate(tendons):
-        first = _first_joint(arms[i])
+        first = next((j for j, arm in enumerate(arms[i], start=1) if arm.arm != 0.0), None)
         if tendon.frictionloss and first is not None and not motors_of(model, tendon):
             yield {"effect": "preload_friction", "joint": first, "tendon": i + 1, "coulomb": tendon.frictionloss}
-
-
-def _first_joint(arms: Sequence[MomentArm]) -> int | None:
-    """Return the first joint (from 1) that a tendon turns, where all of its length slides; None without any."""
-    return next((j for j, arm in enumerate(arms, start=1) if arm.arm != 0.0), None)
 
 
 def _arm_warnings(
@@ -357,8 +351,7 @@ def left_out(
     has_gravity: bool,
     has_links: bool,
 ) -> list[str]:
-    """List what an import leaves out."""
-    # angles: [K, n] (rad)
+    """List what an import leaves out. angles: [K, n] (rad)."""
     rows = [
         *_of_joints(model, joints, angles),
         *_of_tendons(model, joints, tendons, angles),

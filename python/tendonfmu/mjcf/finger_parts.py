@@ -42,8 +42,7 @@ class MomentArm:
 
 
 def sampled_angles(ranges: Numbers) -> Numbers:
-    """Return angles that cover the ranges of all joints."""
-    # ranges: [n, 2] (rad); returns [K, n] (rad)
+    """Return angles that cover the ranges of all joints. ranges: [n, 2] (rad); returns [K, n] (rad)."""
     low, high = ranges[:, 0], ranges[:, 1]
     rows = [np.tile((low + high) / 2, (STEPS, 1)) for _ in ranges]
     for j, row in enumerate(rows):
@@ -55,8 +54,7 @@ def sampled_angles(ranges: Numbers) -> Numbers:
 def moment_arms(
     model: CompiledModel, joints: Sequence[Joint], tendons: Sequence[Tendon], angles: Numbers, tolerance: float
 ) -> list[list[MomentArm]]:
-    """Read the moment arms of a model."""
-    # angles: [K, n] (rad); returns [m][n]
+    """Read the moment arms of a model. angles: [K, n] (rad); returns [m][n]."""
     rows, columns = [tendon.index for tendon in tendons], [joint.velocity for joint in joints]
     arms = np.empty((len(angles), len(tendons), len(joints)))
     for k, placed in enumerate(angles):
@@ -129,8 +127,7 @@ def _listed(vector: Numbers) -> list[float]:
 
 
 def holding_torques(model: CompiledModel, joints: Sequence[Joint], angles: Numbers) -> Numbers:
-    """Return the torques that hold the links' weight."""
-    # angles: [K, n] (rad); returns [K, n] (N·m)
+    """Return the torques that hold the links' weight. angles: [K, n] (rad); returns [K, n] (N·m)."""
     rows = []
     for placed in angles:
         model.place(joints, placed)
@@ -167,8 +164,7 @@ def gravity_rows(angles: Numbers, torques: Numbers, axes: Numbers | None) -> tup
 
 
 def moved_velocities(model: CompiledModel, joints: Sequence[Joint], angles: Numbers) -> NDArray[np.bool_]:
-    """Return which velocities of the model each tendon moves."""
-    # angles: [K, n] (rad); returns [tendons, velocities]
+    """Return which velocities of the model each tendon moves. angles: [K, n] (rad); returns [tendons, velocities]."""
     largest = np.zeros((len(model.tendons), 0))
     for placed in angles[:: max(1, len(angles) // 32)]:
         model.place(joints, placed)
@@ -180,8 +176,7 @@ def moved_velocities(model: CompiledModel, joints: Sequence[Joint], angles: Numb
 def choose_tendons(
     model: CompiledModel, joints: Sequence[Joint], angles: Numbers, names: Sequence[str] | None
 ) -> list[Tendon]:
-    """Return the tendons of a finger."""
-    # angles: [K, n] (rad)
+    """Return the tendons of a finger. angles: [K, n] (rad)."""
     velocities = [joint.velocity for joint in joints]
     moves = np.array(moved_velocities(model, joints, angles)[:, velocities].any(axis=1), ndmin=1)
     if names is None:

@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +16,44 @@ from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError, InternalError, own_fault
 from tendonfmu.estimate import FIT_REPORT
 from tendonfmu.files import counted, read_json, whole_file
-from tendonfmu.mjcf.compiled_model import CompiledModel, Joint
+from tendonfmu.mjcf.compiled_model import CompiledModel, Joint, XmlSource
 from tendonfmu.mjcf.finger_import import links_inertia
 from tendonfmu.mjcf.finger_parts import motors_of
-from tendonfmu.mjcf.replay import replay_errors
-from tendonfmu.mjcf.xml_source import XmlSource
 from tendonfmu.model import Finger, Law, effects, extension_rows, read_finger, sides
-from tendonfmu.recordings import admit, read_recordings
+from tendonfmu.recordings import FEWEST, Recording, admit, gaps, read_recordings, tendon_angles, zero_phase
+
+# --- replay -----------------------------------------------------------------------------------------------------------
+
+
+CUTOFF = 10.0  # Hz; motion beyond it is noise
+SAMPLES = 4000  # of each recording
+
+
+def replay_errors(file: Path, finger: Finger, recordings: Sequence[Recording]) -> Numbers:
+    """Return the rms (N·m) [n] of what MuJoCo's inverse dynamics leave of the torque in recordings of free motion."""
+    model = CompiledModel(file)
+    joints = [model.joint_named(str(name)) for name in finger.joint_names]
+    tendons = [model.tendon_named(str(name)) for name in finger.tendon_names]
+    model.leave_alone(tendons)
+    squares: list[Numbers] = []
+    for recording in recordings:
+        time, groups = recording.time, recording.groups
+        angles = groups.get("joint_position", tendon_angles(recording, finger))
+        every = max(1, len(time) // SAMPLES)
+        for begin, end in pairwise([0, *gaps(time), len(time)]):
+            if end - begin < FEWEST:
+                continue
+            rate = 1.0 / float(np.median(np.diff(time[begin:end])))
+            angle, force = (zero_phase(each[begin:end], CUTOFF, rate) for each in (angles, groups["tendon_force"]))
+            speed = np.gradient(angle, time[begin:end], axis=0)
+            rows = zip(angle, speed, np.gradient(speed, time[begin:end], axis=0), force, strict=True)
+            for row in list(rows)[every::every]:
+                needed, arms = model.needed_torque(joints, tendons, *row[:3])
+                squares.append((needed - row[3] @ arms) ** 2)
+    if not squares:
+        raise InputError(f"{recordings[0].path}: too short to be replayed; expected {FEWEST} samples without a gap")
+    return np.asarray(np.sqrt(np.mean(squares, axis=0)))
+
 
 SAME = 1e-9  # relative; a number that differs by less is not written again
 WRITTEN = ("inertia", "preload_friction")  # extensions that MJCF may express

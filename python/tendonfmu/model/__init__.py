@@ -11,7 +11,6 @@ from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from . import native
-    from .bent_drawing import BentDrawing
     from .description import (
         Finger,
         FingerSource,
@@ -23,6 +22,7 @@ if TYPE_CHECKING:
         finger_from_text,
         read_finger,
         sides,
+        starting_finger,
     )
     from .description_numbers import (
         DEFAULTS,
@@ -67,8 +67,16 @@ if TYPE_CHECKING:
     )
     from .output_names import FLAGS, INPUTS, NUMBERS, OPTIONAL_NUMBERS, PLACE, SENSORS
     from .plausibility import Finding, description_findings, is_direct_drive
-    from .routing_geometry import EDGE_RED, TENDON_COLOURS, DrawnTendon, FingerDrawing, finger_drawing
-    from .routing_svg import Mark, finger_svg, keys_of
-    from .starting_finger import starting_finger
+    from .routing_geometry import (
+        EDGE_RED,
+        TENDON_COLOURS,
+        BentDrawing,
+        DrawnTendon,
+        FingerDrawing,
+        Mark,
+        finger_drawing,
+        finger_svg,
+        keys_of,
+    )
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -72,8 +72,7 @@ def velocity_threshold(data: Mapping[str, Any], effect: Effect) -> float:
 
 
 def sliding_velocity(data: Mapping[str, Any], effect: Effect, joint_velocity: Numbers) -> Numbers:
-    """Return the velocity that slides an effect."""
-    # joint_velocity: [N, n] (rad/s); returns [N] (rad/s)
+    """Return the velocity that slides an effect. joint_velocity: [N, n] (rad/s); returns [N] (rad/s)."""
     if not effect.tendon:
         return joint_velocity[:, effect.drive - 1]
     arms = moment_arms(data)[effect.tendon - 1]
@@ -94,8 +93,7 @@ def working_point_weights(effect: Effect, joint_position: Numbers) -> Numbers:
 
 
 def moment_arms(data: Mapping[str, Any]) -> Numbers:
-    """Return the routing matrix R of a description."""
-    # returns [m, n] (m)
+    """Return the routing matrix R [m, n] (m) of a description."""
     return np.array([tendon["moment_arms"] for tendon in data["tendons"]], dtype=float)
 
 
@@ -107,8 +105,7 @@ def tendon_positions(data: Mapping[str, Any], angle: Numbers, force: Numbers) ->
 
 
 def pretension_vector(data: Mapping[str, Any]) -> Numbers:
-    """Return the tendon forces per newton of pretension."""
-    # returns [m]
+    """Return the tendon forces [m] per newton of pretension."""
     arms = moment_arms(data)
     pulls = np.array([not tendon.get("bidirectional") for tendon in data["tendons"]])
     project = np.eye(len(arms)) - arms @ np.linalg.pinv(arms)

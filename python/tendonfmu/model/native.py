@@ -141,8 +141,7 @@ class Instance:
             self._finger.set_parameters([self._index(path) for path in values], list(values.values()))
 
     def values(self) -> NDArray[np.float64]:
-        """Return all parameter values."""
-        # returns [p], in canonical order
+        """Return all parameter values [p], in canonical order."""
         return np.array(self._finger.get_parameters(range(self._finger.parameter_count)))
 
     def reset(self) -> None:
@@ -191,7 +190,6 @@ class Instance:
 
     def step_outputs(self) -> dict[str, Array]:
         """Return the arrays that `step` writes."""
-        # returns [n] [m]
         arrays = self._finger.step_outputs()
         return {name: array.view(bool) if array.dtype == np.uint8 else array for name, array in arrays.items()}
 
@@ -203,8 +201,7 @@ class Instance:
         joint_position: Array | None = None,
         joint_velocity: Array | None = None,
     ) -> None:
-        """Take one sample and write its outputs into the arrays of `step_outputs`."""
-        # time: (s); tendon_force, tendon_position: [m]; joint_position, joint_velocity: [n]
+        """Take one sample, of tendons [m] and joints [n], and write its outputs into the arrays of `step_outputs`."""
         try:  # a context manager takes longer than the step
             self._finger.step(time, tendon_force, tendon_position, joint_position, joint_velocity)
         except ValueError as refused:
@@ -212,7 +209,6 @@ class Instance:
 
     def directional_derivative(self, direction: Mapping[str, Array]) -> dict[str, Array]:
         """Return the derivative of the last sample's outputs along a direction of its inputs."""
-        # direction: [m]; returns change of each output [n]
         sizes = (self.tendons, self.tendons, self.joints, self.joints)
         seeds = [
             np.asarray(direction.get(name, np.zeros(size)), dtype=float).tolist()

@@ -77,8 +77,7 @@ def description_findings(finger: Finger) -> list[Finding]:
 
 
 def is_direct_drive(arms: Numbers) -> bool:
-    """Return whether all moment arms are 1 m."""
-    # arms: [m, n] (m)
+    """Return whether all moment arms are 1 m. arms: [m, n] (m)."""
     return bool(np.all(np.abs(arms[arms != 0.0]) == 1.0))
 
 

@@ -1,7 +1,7 @@
 """How recordings are read, checked and prepared for a fit.
 
 `recording` reads them and `converters` turns foreign formats into ours. `match` says whether they belong to a finger,
-and if not, why. `smoothing`, `prepared` and `residuals` prepare them for a fit and compute the torque that a finger
+and if not, why. `prepared`, `signal_noise` and `residuals` prepare them for a fit and compute the torque that a finger
 leaves unexplained.
 """
 
@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from .best_angles import BestAngles, best_angles, with_angles
     from .columns import GROUPS, element_of, right_spelling
     from .converters import convert_file
     from .converters.column_map import read_log_format
@@ -28,14 +27,16 @@ if TYPE_CHECKING:
     )
     from .converters.table import Conversion, convert_table
     from .faults import gaps, tendon_angles
-    from .grid import Grid, Segment, make_grid
     from .match import UNFIT_FOR_SEARCH, admit, belongs
     from .match_text import check_report, recording_report, refusal_report, routing_entry, varying_sentences
     from .prepared import (
         FitRecording,
+        Grid,
         Held,
+        Segment,
         bias_is_constant,
         held_out_blocks,
+        make_grid,
         motion_of,
         prepare,
         refuse_stillness,
@@ -49,7 +50,6 @@ if TYPE_CHECKING:
         Recording,
         RecordingSource,
         at_rows,
-        flagged_rows,
         flagged_stretches,
         listed_sources,
         read_recording,
@@ -66,8 +66,6 @@ if TYPE_CHECKING:
         routed,
         smooth_speeds,
     )
-    from .signal_noise import FEWEST, joint_position_noise
-    from .smoothing import zero_phase
-    from .stop_operator import stopped
+    from .signal_noise import FEWEST, BestAngles, best_angles, joint_position_noise, stopped, with_angles, zero_phase
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -53,16 +53,13 @@ def read_columns(file: Path, names: Sequence[str], known: Collection[str]) -> li
         listed = ", ".join(repr(name) for name in ignored)
         groups = ", ".join(f"{group}[i]" for group in GROUPS)
         warnings.warn(
-            f"{file}: ignored columns: {listed}; a recording has time, {groups} and {LABEL}",
-            InputWarning,
-            stacklevel=2,
+            f"{file}: ignored columns: {listed}; a recording has time, {groups} and {LABEL}", InputWarning, stacklevel=2
         )
     return ours
 
 
 def right_spelling(column: str) -> str | None:
     """Return the right name of a column that is one of ours in another spelling."""
-    # returns [1]
     match = _ONE_OF_OURS.fullmatch(re.sub(r"[\s_.\-()\[\]{}]", "", column).lower())
     if match is None:
         return None

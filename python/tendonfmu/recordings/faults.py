@@ -65,8 +65,7 @@ class StuckSensor:
 
 
 def gaps(time: Numbers) -> list[int]:
-    """Return the first samples after gaps or jumps of the clock."""
-    # time: [N] (s)
+    """Return the first samples after gaps or jumps of the clock. time: [N] (s)."""
     if len(time) < 3:
         return []
     step = np.diff(time)
@@ -139,7 +138,7 @@ def stuck_sensors(recording: Recording, finger: Finger) -> dict[str, list[StuckS
 
 def expected_values(recording: Recording, finger: Finger, group: str, k: int) -> Numbers | None:
     """Return what a channel should read according to the other channels, up to a constant."""
-    # group: (rad); returns [N]
+    # returns [N], in the unit of the channel
     groups = recording.groups
     if group == "tendon_position":
         return _position_by_others(groups, np.asarray(finger.moment_arms, dtype=float), _stretch(recording, finger), k)

@@ -33,13 +33,7 @@ EQUATED = ("tendon_force", "tendon_position", "joint_position")  # groups of the
 # Units in which logs are often written, with their factors to the units of a recording
 UNITS: dict[str, tuple[tuple[float, str], ...]] = {
     "tendon_position": ((1e-3, "mm"), (1e-2, "cm"), (1e-6, "µm"), (0.0254, "inch")),
-    "tendon_force": (
-        (9.80665, "kgf or daN"),
-        (9.80665e-3, "gf or cN"),
-        (1e-3, "mN"),
-        (4.448222, "lbf"),
-        (1e3, "kN"),
-    ),
+    "tendon_force": ((9.80665, "kgf or daN"), (9.80665e-3, "gf or cN"), (1e-3, "mN"), (4.448222, "lbf"), (1e3, "kN")),
     "joint_position": ((np.pi / 180, "degrees"), (1e-3, "mrad"), (2 * np.pi, "turns")),
 }
 WINDOW = 0.1  # s over which changes of angles and velocities are compared

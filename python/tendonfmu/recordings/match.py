@@ -16,7 +16,6 @@ from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.model import Finding, Finger, is_direct_drive
 from tendonfmu.recordings import match_text as text
-from tendonfmu.recordings import trap_text
 from tendonfmu.recordings.faults import (
     TURNS,
     clipped_channels,
@@ -43,7 +42,7 @@ from tendonfmu.recordings.prepared import MANY_RESTS, left_at_rest
 from tendonfmu.recordings.recording import GROUP_PER, Recording, check_numbers
 from tendonfmu.recordings.routing import TendonRouting, clock_drift, learn_routing, routed
 from tendonfmu.recordings.signal_noise import white_noise
-from tendonfmu.recordings.traps import find_traps
+from tendonfmu.recordings.traps import drift_finding, find_traps, trap_finding
 
 UNFIT, POOR = 0.15, 0.03  # share of variance that the equations leave: above these an error, a warning
 UNFIT_FOR_SEARCH = 0.5  # the same error for a search of causes: a spring, arm or play may be what is to be found
@@ -118,7 +117,7 @@ def _findings(finger: Finger, recording: Recording, unfit: float) -> list[Findin
     unit = clock.entries.get("time", {}).get("scale") if clock else None
     if isinstance(unit, float):
         recording = replace(recording, time=recording.time * unit)
-    traps = [trap_text.trap(recording.path, found) for found in find_traps(finger, recording)]
+    traps = [trap_finding(recording.path, found) for found in find_traps(finger, recording)]
     if _has_error(traps):  # equations and other channels tell nothing then
         return [*findings, *traps]
     findings += traps
@@ -200,7 +199,7 @@ def _of_kinematics(finger: Finger, recording: Recording, unfit: float) -> tuple[
         findings = [text.repair(recording.path, fitting) for fitting in done]
         findings += [text.routing(recording.path, finger, each, "warning") for each in off]
         if (drift := clock_drift(learned)) is not None and drift.differs:
-            findings.append(trap_text.drift(recording.path, drift, float(np.ptp(recording.time))))
+            findings.append(drift_finding(recording.path, drift, float(np.ptp(recording.time))))
         for fitting in done:
             recording = _mended(recording, fitting.correction)
         if left > POOR:

@@ -374,11 +374,6 @@ def coarse(path: Path, channel: Coarse) -> Finding:
 # --- what to write into the map ---------------------------------------------------------------------------------------
 
 
-def map_keys(entries: Mapping[str, Entry]) -> dict[str, dict[str, float | str]]:
-    """Return the keys of a map whose log is the recording itself, with its columns in SI."""
-    return {column: _keys(column.split("[")[0], entry) for column, entry in entries.items()}
-
-
 def _keys(group: str, entry: Entry) -> dict[str, float | str]:
     keys: dict[str, float | str] = {}
     for key, value in entry.items():
@@ -460,7 +455,9 @@ def recording_report(recording: Recording, findings: Sequence[Finding]) -> dict[
 
 
 def _entry(finding: Finding) -> dict[str, Any]:
-    return {**asdict(finding), "path": str(finding.path), "map": map_keys(finding.entries), "line": finding.line()}
+    # keys of a map whose log is the recording itself, with its columns in SI
+    keys = {column: _keys(column.split("[")[0], entry) for column, entry in finding.entries.items()}
+    return {**asdict(finding), "path": str(finding.path), "map": keys, "line": finding.line()}
 
 
 def verdict(recording: Recording, findings: Sequence[Finding]) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from tendonfmu.arrays import Flags, Numbers
+from tendonfmu.arrays import Array, Flags, Numbers
 from tendonfmu.errors import InputError, NothingLeftError
 from tendonfmu.files import are, counted, percent
 from tendonfmu.model import (
@@ -24,14 +24,7 @@ from tendonfmu.model import (
     velocity_threshold,
     watches_motors,
 )
-from tendonfmu.recordings.faults import (
-    SETTLING,
-    gap_sentences,
-    gaps,
-    rate_sentences,
-    silent_tendons,
-    stuck_sensors,
-)
+from tendonfmu.recordings.faults import SETTLING, gap_sentences, gaps, rate_sentences, silent_tendons, stuck_sensors
 from tendonfmu.recordings.recording import Recording, check_numbers
 from tendonfmu.recordings.residuals import Model, run_parts
 
@@ -57,7 +50,7 @@ class FitRecording:
 
     recording: Recording  # the recording itself
     kinematics: int  # source of angles and speeds, 1 to 3
-    target: Numbers  # torque that the model has to explain [N, n] (N·m): τ, or τ − external_torque (eq
+    target: Numbers  # torque that the model has to explain [N, n] (N·m): τ, or τ − external_torque
     train: Flags  # flags [N]; each sample has at most one of them
     held_out: Flags
     contact_out: Flags
@@ -101,13 +94,16 @@ class FitRecording:
         """Return the signals of one part."""
         return {name: np.ascontiguousarray(values[part]) for name, values in self.recording.arrays().items()}
 
+    def with_groups(self, **groups: Numbers) -> FitRecording:
+        """Return the recording with other signals of some groups."""
+        return replace(self, recording=replace(self.recording, groups={**self.recording.groups, **groups}))
+
     def run(self, data: Mapping[str, Any]) -> Model:
         """Run a finger over the recording; its bias learns from the tracked samples."""
         return run_parts(data, self.recording.arrays(), self.parts, self.tracked, self.kinematics)
 
     def entry(self) -> dict[str, Any]:
         """Return what a report says about the recording."""
-        # returns (s)
         return {
             "path": str(self.path),
             "samples": len(self.time),
@@ -227,8 +223,7 @@ def _refuse_too_little(recording: Recording, parts: list[slice], usable: Flags, 
 
 
 def slack_sentences(slack: Flags, finger: Finger) -> list[str]:
-    """Describe tendons whose modelled force falls below zero."""
-    # slack: [N, m]
+    """Describe tendons whose modelled force falls below zero. slack: [N, m]."""
     share = slack.mean(axis=0)
     return [
         f"tendon {i + 1} ({finger.tendon_names[i]}) is slack in {percent(part)} of the samples: its modelled force "
@@ -355,3 +350,66 @@ def require_noise(finger: Finger, recordings: list[FitRecording]) -> None:
                 f"{finger.path}: bias.noise_std = 0, and {row} has no tendon force: its residual would count "
                 "infinitely much; expected bias.noise_std above 0 (N.m)"
             )
+
+
+# --- blocks of time ---------------------------------------------------------------------------------------------------
+
+
+SHORTEST_STEP = 0.01  # s; shortest block
+MOST_BLOCKS = 12_000
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A stretch of a recording without a gap, cut into blocks with equally many samples."""
+
+    recording: int  # its number, from 0
+    part: slice  # its samples there
+    first: int  # first block in the whole series, and number of blocks
+    count: int
+    samples: int  # samples of a block
+
+    @property
+    def blocks(self) -> slice:
+        return slice(self.first, self.first + self.count)
+
+    def mean(self, values: Array) -> Array:
+        """Return block means [count, ...] of values [samples of the part, or as many as the blocks have, ...]."""
+        whole = values[: self.count * self.samples]
+        return np.asarray(whole.reshape(self.count, self.samples, *whole.shape[1:]).mean(axis=1))
+
+
+@dataclass(frozen=True)
+class Grid:
+    """All segments, one after another; they are the estimator's recordings. `step` is the length of a block, s."""
+
+    segments: tuple[Segment, ...]
+    step: float
+
+    @property
+    def blocks(self) -> int:
+        return sum(segment.count for segment in self.segments)
+
+    def means(self, values: Sequence[Array]) -> Array:
+        """Return block means [B, ...] of values [N, ...] of each recording."""
+        return np.concatenate([segment.mean(values[segment.recording][segment.part]) for segment in self.segments])
+
+    def forces(self, recordings: Sequence[FitRecording]) -> Numbers:
+        """Return block means of the tendon forces, N [B, m]."""
+        return self.means([recording.recording.groups["tendon_force"] for recording in recordings])
+
+
+def make_grid(recordings: Sequence[FitRecording], shortest: float = SHORTEST_STEP) -> Grid:
+    """Cut recordings into blocks of about 10 ms, or of another length (s)."""
+    duration = sum(recording.duration for recording in recordings)
+    step = max(shortest, duration / MOST_BLOCKS)
+    segments, first = [], 0
+    for number, recording in enumerate(recordings):
+        samples = max(1, round(step / float(np.median(np.diff(recording.time)))))
+        samples += samples % 2 if samples > 3 else 0  # runs of the core thin by whole parts of a block
+        for part in recording.parts:
+            count = (part.stop - part.start) // samples
+            if count and recording.train[part].any():
+                segments.append(Segment(number, part, first, count, samples))
+                first += count
+    return Grid(tuple(segments), step)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tendonfmu.arrays import flagged_rows
 from tendonfmu.errors import InputError
 from tendonfmu.files import Table, counted, frame_of, is_frame, path_of, read_table, table_of_frame, write_table
 from tendonfmu.recordings.columns import GROUP_PER as GROUP_PER
@@ -380,12 +381,6 @@ def flagged_stretches(time: NDArray[np.float64], flags: NDArray[Any]) -> list[tu
     """Return the stretches of flagged samples."""
     # time: [N] (s); flags: [N]; returns begin and end of each stretch (s); it lasts until the next sample
     return [(float(time[begin]), float(time[min(end, len(time) - 1)])) for begin, end in flagged_rows(flags)]
-
-
-def flagged_rows(flags: NDArray[Any]) -> list[tuple[int, int]]:
-    """Return the first row of each stretch of flagged samples [N], and the row after its last."""
-    steps = np.diff(np.concatenate([[0], np.asarray(flags).astype(bool).astype(int), [0]]))
-    return list(zip(np.flatnonzero(steps > 0).tolist(), np.flatnonzero(steps < 0).tolist(), strict=True))
 
 
 def _labelled(recording: Recording, label: str) -> Recording:

@@ -73,8 +73,7 @@ def delayed_torque(data: Mapping[str, Any], arrays: Mapping[str, Numbers], torqu
 
 
 def rms(values: Numbers, chosen: Flags) -> list[float]:
-    """Return the root mean square of the chosen rows."""
-    # values: [N, n]; chosen: [N]; returns [n]
+    """Return the root mean square of the chosen rows. values: [N, n]; chosen: [N]; returns [n]."""
     picked = values[chosen]
     picked = picked[~np.isnan(picked).any(axis=1)]
     if not len(picked):

@@ -24,9 +24,7 @@ from tendonfmu.errors import InputError
 from tendonfmu.model import Finger, finger_from_data
 from tendonfmu.recordings.faults import gaps, still_runs
 from tendonfmu.recordings.recording import Recording
-from tendonfmu.recordings.signal_noise import FEWEST, white_noise
-from tendonfmu.recordings.smoothing import zero_phase
-from tendonfmu.recordings.stop_operator import stopped
+from tendonfmu.recordings.signal_noise import FEWEST, stopped, white_noise, zero_phase
 from tendonfmu.statistics import Estimate, noisy_regression
 
 BLOCK = 2.0  # s; longer than residuals of sensors are correlated
@@ -130,25 +128,10 @@ class TendonRouting:
 def learn_routing(
     finger: Finger, recordings: Sequence[Recording], reference: Sequence[Recording] = (), *, coupled: bool = False
 ) -> list[TendonRouting]:
-    """Learn the routing of every tendon from the recordings with joint positions.
-
-    Parameters
-    ----------
-    finger
-        Says which tendon passes which joint (a moment arm that is not 0), and the numbers to compare with.
-    recordings
-        Those without `joint_position` do not count, but where there are no others: then redundant tendons show
-        every stiffness, and at a single joint the arms and zeros of one against the other.
-    reference
-        Of the same finger; what they show is compared with, in place of what is described.
-    coupled
-        Whether to learn the arms at joints that a tendon does not pass, too.
-
-    Returns
-    -------
-    list of TendonRouting
-        In the order of the tendons, without those that are slack or whose recordings are too short.
-    """
+    """Learn the routing of the tendons that the recordings show; arms at joints they do not pass, too, if `coupled`."""
+    # Recordings without `joint_position` count only where there are no others: then redundant tendons show every
+    # stiffness, and at a single joint the arms and zeros of one against the other. What a reference of the same finger
+    # shows is compared with, in place of what is described.
     sides = [list(side) for side in (recordings, reference) if side]
     for recording in (*recordings, *reference):
         recording.require(finger.joints, finger.tendons, ())

@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.arrays import Flags, Numbers
+from tendonfmu.arrays import Flags, Numbers, flagged_rows
 from tendonfmu.drawing import BLUE, DARK, GREEN, GREY, IN_DARK, LIGHT, ORANGE, VERMILION
 from tendonfmu.errors import InputError
 from tendonfmu.files import check_output, whole_file
 from tendonfmu.model import TENDON_COLOURS, BentDrawing, Finger, FingerDrawing, finger_drawing
-from tendonfmu.recordings import Recording, flagged_rows
+from tendonfmu.recordings import Recording
 
 INSTALL = 'pip install "tendonfmu[rerun]", or rerun-sdk'
 TIMELINE = "time"

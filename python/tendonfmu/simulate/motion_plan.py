@@ -87,7 +87,8 @@ def _still(motion: Node, joints: Joints) -> Motion:
     motion.keys(("kind", "duration", "position", "pretension"))
     motion.member("duration").number(0.0, LONGEST, "s", default=LONGEST, above=True)
     position = _posture(motion.member("position"), joints.lower, joints.upper)
-    return Motion([_standing(angle) for angle in position], _pretension(motion), "still")
+    knots = [{"time": [0.0], "position": [angle], "velocity": [0.0], "acceleration": [0.0]} for angle in position]
+    return Motion(knots, _pretension(motion), "still")
 
 
 def _strokes(motion: Node, joints: Joints, seed: int, duration: float | None) -> Motion:
@@ -166,10 +167,6 @@ def _from_file(motion: Node, joints: Joints) -> Motion:
 
 
 # --- parts ------------------------------------------------------------------------------------------------------------
-
-
-def _standing(angle: float) -> dict[str, list[float]]:
-    return {"time": [0.0], "position": [angle], "velocity": [0.0], "acceleration": [0.0]}
 
 
 def _posture(node: Node, lower: Sequence[float], upper: Sequence[float]) -> list[float]:

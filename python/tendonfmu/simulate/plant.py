@@ -180,8 +180,7 @@ class Plant:
             self._plant.initialise()
 
     def advance(self, time: float) -> None:
-        """Integrate up to a time."""
-        # time: (s)
+        """Integrate up to a time (s)."""
         with _refusals():
             self._plant.advance(time)
 
@@ -191,8 +190,7 @@ class Plant:
             self._plant.reset()
 
     def hold_command(self) -> NDArray[np.float64]:
-        """Return the motor positions that hold the rig's first posture with its pretension."""
-        # returns [m] (m)
+        """Return the motor positions [m] (m) that hold the rig's first posture with its pretension."""
         with _refusals():
             return np.array(self._plant.hold_command())
 
@@ -223,13 +221,11 @@ class Plant:
             return Statistics(*self._plant.statistics())
 
     def continuous_state(self) -> NDArray[np.float64]:
-        """Return the state at the present time."""
-        # returns [order], in the order of tendonfmu_plant_derivative
+        """Return the state at the present time. Returns [order], in the order of tendonfmu_plant_derivative."""
         with _refusals():
             return self._plant.continuous_state().reshape(-1)
 
     def derivative(self, time: float, state: Array) -> NDArray[np.float64]:
-        """Return the right-hand side of the differential equations."""
-        # state: [order]; returns [order]
+        """Return the right-hand side of the differential equations. state: [order]; returns [order]."""
         with _refusals():
             return self._plant.derivative(time, np.ascontiguousarray(state, dtype=np.float64)).reshape(-1)

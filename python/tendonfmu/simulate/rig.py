@@ -206,12 +206,7 @@ def _expand(path: Path, files: list[Path], data: dict[str, Any]) -> Rig:
     if motion.file is not None:
         files.append(motion.file)
     pushes = expand_pushes(root.member("pushes"), segments, seed, math.inf if duration is None else duration)
-    expanded = data | {
-        "finger": finger.data,
-        "seed": seed,
-        "motion": motion.expanded(),
-        "pushes": pushes,
-    }
+    expanded = data | {"finger": finger.data, "seed": seed, "motion": motion.expanded(), "pushes": pushes}
     return Rig(path, files, data, finger, motion, expanded, rate, duration, columns)
 
 

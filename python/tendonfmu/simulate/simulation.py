@@ -61,10 +61,7 @@ class Simulation:
 
 
 def simulate(
-    rig: Rig,
-    *,
-    truth: bool = False,
-    progress: Callable[[int, int], None] = lambda done, total: None,
+    rig: Rig, *, truth: bool = False, progress: Callable[[int, int], None] = lambda done, total: None
 ) -> Simulation:
     """Run a rig from its initialisation to the end of its recording.
 

@@ -1,8 +1,8 @@
 """How certain results are: statistics without any knowledge of fingers.
 
-Series are averaged over blocks, and parts are held out (`blocks`). Splines remove a slow bias (`splines`). Columns are
-judged by their Gram matrices (`block_grams`), noise is whitened and correlated samples are counted (`whitening`), and
-counts and measurements get an interval (`intervals`, `paired_gain`, `noisy_regression`).
+Series are averaged over blocks, parts are held out, and splines remove a slow bias (`blocks`). Columns are judged by
+their Gram matrices (`block_grams`), noise is whitened and correlated samples are counted (`whitening`), and counts and
+measurements get an interval (`intervals`, `noisy_regression`).
 """
 
 from typing import TYPE_CHECKING
@@ -10,29 +10,25 @@ from typing import TYPE_CHECKING
 from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from . import intervals, paired_gain, quintic
+    from . import intervals, quintic
     from .block_grams import MEMORY, Grams, Products, bounded, standard_error
     from .blocks import (
         FEWEST_STRETCHES,
+        KNOTS,
         STRETCH,
         BlockSeries,
         Folds,
-        make_folds,
-    )
-    from .intervals import Interval
-    from .noisy_regression import Estimate, noisy_regression
-    from .paired_gain import BlockIndex, blocks_of, gain_interval, variance_between
-    from .random_numbers import LARGEST_SEED, Draws
-    from .spectral_line import Line, find_lines
-    from .splines import (
-        KNOTS,
         Span,
         Splines,
         basis,
+        make_folds,
         residual_of,
         spline_basis,
         without,
     )
-    from .whitening import Whitener, effective_samples, sample_weights, whitener
+    from .intervals import BlockIndex, Interval, blocks_of, gain_interval, variance_between
+    from .noisy_regression import Estimate, noisy_regression
+    from .random_numbers import LARGEST_SEED, Draws
+    from .whitening import Line, Whitener, effective_samples, find_lines, sample_weights, whitener
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from tendonfmu.arrays import Array, Indices, Numbers
-from tendonfmu.statistics.blocks import Folds
-from tendonfmu.statistics.splines import Span, Splines
+from tendonfmu.statistics.blocks import Folds, Span, Splines
 
 MEMORY = 20.0  # blocks over which noise is correlated, about; so many rows count as one against prior knowledge
 _PIECE = 4096  # rows at a time
@@ -49,8 +48,7 @@ class Products:
         return total
 
     def chosen(self, shared: Numbers | None, candidates: Indices | None) -> Products:
-        """Return the products with other columns."""
-        # shared: [c, k]
+        """Return the products with other columns. shared: [c, k]."""
         u = self.nominal_count
         mixed = np.zeros((self.count, 0)) if shared is None else shared
         kept = np.arange(self.count) if candidates is None else candidates
@@ -78,8 +76,7 @@ class Products:
         return turned
 
     def with_own(self, values: Array) -> Products:
-        """Return the products with other candidates."""
-        # values: [r, n, k]
+        """Return the products with other candidates. values: [r, n, k]."""
         u = self.nominal_count
         changed = copy(self)
         changed.count = values.shape[2]
@@ -174,8 +171,7 @@ class Grams:
         return float(sum(fold.own_square for fold, counts in zip(self._by_fold, self._judged, strict=True) if counts))
 
     def surviving(self, mix: Numbers) -> float:
-        """Return how much of a combination of candidates the refit leaves."""
-        # mix: [c, d]
+        """Return how much of a combination of candidates the refit leaves. mix: [c, d]."""
         used = np.flatnonzero(mix.any(axis=1))
         part, inner = mix[used], np.ix_(used, used)
         before = part.T @ self._raw[inner] @ part
@@ -319,8 +315,7 @@ class Grams:
         return [self.folds.fold == number for number in range(self.folds.folds)]
 
     def residual(self) -> Numbers:
-        """Return what the nominal model, refitted to all folds, leaves of the target."""
-        # returns [R, n] (N·m)
+        """Return what the nominal model, refitted to all folds, leaves of the target. Returns [R, n] (N·m)."""
         change = self._whole.refit[:, -1]
         return np.asarray(self._target - self._table[:, :, : self.nominal_count] @ change)
 
@@ -368,7 +363,6 @@ def _solved(matrix: Numbers, right: Numbers) -> Numbers:
 
 
 def standard_error(gains: Sequence[float] | Numbers) -> float:
-    """Return the standard error of a sum of gains."""
-    # gains: [K]
+    """Return the standard error of a sum of gains. gains: [K]."""
     values = np.asarray(gains)
     return float(np.sqrt(len(values)) * np.std(values, ddof=1)) if len(values) > 1 else np.inf

@@ -6,13 +6,14 @@ They are exact if the distribution is known, otherwise from a bootstrap. NaN sta
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import betaincinv, gammaincinv  # not scipy.stats, which takes a second to import
 
-from tendonfmu.arrays import Numbers
+from tendonfmu.arrays import Flags, Numbers, flagged_rows
 
 Statistic = Callable[[Numbers], Numbers]
 
@@ -51,8 +52,7 @@ def rate(count: int, exposure: float) -> Interval:
 
 
 def quantile(values: Numbers, probability: float, seed: int) -> Interval:
-    """Return a quantile, with an interval from resampled events (percentiles)."""
-    # values: [k]
+    """Return a quantile, with an interval from resampled events (percentiles). values: [k]."""
     if not len(values):
         return Interval(math.nan)
     value = float(np.quantile(values, probability))
@@ -88,3 +88,138 @@ def _percentiles(drawn: Numbers) -> tuple[float, float]:
         return math.nan, math.nan
     low, high = np.quantile(known, [_TAIL, 1 - _TAIL])
     return float(low), float(high)
+
+
+# --- gains between two models -----------------------------------------------------------------------------------------
+# Residuals are coloured, and their size depends on the motion. So blocks of about two seconds are drawn, each with the
+# residuals of both models, and the logarithm of the ratio of their rms is studentised. This is the block bootstrap of
+# Künsch, "The jackknife and the bootstrap for general stationary observations", Ann. Statist. 17 (1989), with the
+# bootstrap-t of Efron and Tibshirani, "An introduction to the bootstrap" (1993), section 12.5.
+
+
+BLOCK = 2.0  # s; longer than residuals of a fitted finger are correlated
+LEVEL = 0.95
+FEWEST_BLOCKS = 3  # blocks; fewer give no interval
+_FEW, _SHORTEST = 6, 0.5  # blocks, wanted at least; s, shortest block for this
+_RESAMPLES = 4000
+_MOST_DRAWN = 400  # blocks; more are joined
+_NORMAL = 1.96  # standard deviations
+_LEAST_PLAIN = 12  # blocks; with fewer, the resamples' own errors are too rough, and Student's t is used
+
+
+@dataclass(frozen=True)
+class BlockIndex:
+    """The block of each sample."""
+
+    index: NDArray[np.intp]  # [N], from 0; −1 outside the chosen samples
+    count: int  # number of blocks
+
+    def sums(self, values: Numbers) -> Numbers:
+        """Return the sums of values over the blocks. values: [N]; returns [count]."""
+        chosen = self.index >= 0
+        return np.asarray(np.bincount(self.index[chosen], weights=values[chosen], minlength=self.count), dtype=float)
+
+
+def blocks_of(time: Numbers, chosen: Flags, length: float = BLOCK) -> BlockIndex:
+    """Cut the chosen samples into blocks. time: [N] (s); chosen: [N]; length: (s)."""
+    index = np.full(len(time), -1, dtype=np.intp)
+    stretches = flagged_rows(chosen)
+    chosen_seconds = sum(float(time[end - 1] - time[begin]) for begin, end in stretches)
+    length = min(length, max(chosen_seconds / _FEW, _SHORTEST))
+    count = 0
+    for begin, end in stretches:
+        span = float(time[end - 1] - time[begin])
+        parts = max(1, round(span / length))
+        if span < length / 2 and count:
+            index[begin:end] = count - 1
+            continue
+        share = (time[begin:end] - time[begin]) / span if span > 0 else np.zeros(end - begin)
+        index[begin:end] = count + np.minimum((share * parts).astype(np.intp), parts - 1)
+        count += parts
+    return BlockIndex(index, count)
+
+
+def gain_interval(before: Numbers, after: Numbers, seed: int = 0, between: float = 0.0) -> Interval:
+    """Return the gain 1 − rms_after/rms_before with its 95 % interval."""
+    # before, after: [B]; between: variance of log(rms after/rms before) from one recording to the next
+    total_before, total_after = float(before.sum()), float(after.sum())
+    if total_before <= 0:
+        return Interval(0.0)
+    value = 1 - math.sqrt(total_after / total_before)
+    if total_after <= 0 or len(before) < FEWEST_BLOCKS:
+        return Interval(value)
+    pairs = _independent(np.column_stack([before, after]))
+    estimate = math.log(1 - value)
+    low, high = (
+        estimate + math.copysign(math.hypot(end - estimate, _NORMAL * math.sqrt(between)), end - estimate)
+        for end in _log_ratio_ends(pairs, seed)
+    )
+    return Interval(value, 1 - math.exp(high), 1 - math.exp(low))
+
+
+def variance_between(recordings: Sequence[Numbers]) -> float:
+    """Return the variance of log(rms after/rms before) between recordings, beyond what their blocks explain."""
+    # recordings: [B, 2] block sums of squares of each, before and after. No recording shows by itself how much another
+    # motion changes the gain (DerSimonian and Laird, "Meta-analysis in clinical trials", Control. Clin. Trials 1986)
+    known = [
+        _independent(pairs) for pairs in recordings if len(pairs) >= FEWEST_BLOCKS and (pairs.sum(axis=0) > 0).all()
+    ]
+    if len(known) < 2:
+        return 0.0
+    found = np.array([[float(part[0]) for part in _log_ratio(np.ones((1, len(pairs))), pairs)] for pairs in known])
+    return max(0.0, float(np.var(found[:, 0], ddof=1) - np.mean(found[:, 1] ** 2)))
+
+
+def _log_ratio_ends(pairs: Numbers, seed: int) -> tuple[float, float]:
+    """Return the ends of the interval of log(rms after/rms before). pairs: [B, 2] sums of squares."""
+    estimate, error = (float(part[0]) for part in _log_ratio(np.ones((1, len(pairs))), pairs))
+    if error <= 0:
+        return estimate, estimate
+    low, high = _quantiles(pairs, estimate, seed)
+    return estimate - high * error, estimate - low * error
+
+
+def _quantiles(pairs: Numbers, estimate: float, seed: int) -> tuple[float, float]:
+    """Return the quantiles of the studentised log ratio."""
+    from scipy.stats import t
+
+    tail = (1 - LEVEL) / 2
+    plain = float(t.ppf(1 - tail, len(pairs) - 1))
+    if len(pairs) < _LEAST_PLAIN:
+        return -plain, plain
+    shares = np.full(len(pairs), 1 / len(pairs))
+    draws = np.random.default_rng(seed).multinomial(len(pairs), shares, _RESAMPLES).astype(float)
+    drawn, errors = _log_ratio(draws, pairs)
+    studentised = (drawn - estimate) / np.where(errors > 0, errors, np.nan)
+    low, high = np.nanquantile(studentised, [tail, 1 - tail])
+    return float(low), float(high)
+
+
+def _log_ratio(weights: Numbers, pairs: Numbers) -> tuple[Numbers, Numbers]:
+    """Return log(rms after/rms before) [R] and its standard error [R], with blocks counted `weights` [R, B] times."""
+    # The error is that of a ratio of sums (delta method, or infinitesimal jackknife). With the shares a_b, c_b of a
+    # block in both sums its influence is u_b = (a_b − c_b)/2, and the variance is B/(B − 1) Σ u_b².
+    sums = weights @ pairs
+    estimate = 0.5 * np.log(sums[:, 1] / sums[:, 0])
+    share = weights[:, :, None] * pairs[None] / sums[:, None, :]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        single = np.where(weights > 0, (share[:, :, 1] - share[:, :, 0]) / (2 * weights), 0.0)
+    count = weights.sum(axis=1)
+    variance = np.sum(weights * single**2, axis=1) * count / (count - 1)
+    return estimate, np.sqrt(variance)
+
+
+def _independent(pairs: Numbers) -> Numbers:
+    """Join neighbouring blocks in pairs while there are too many, or their influences are correlated beyond chance."""
+    while len(pairs) >= 2 * _LEAST_PLAIN:
+        sums = pairs.sum(axis=0)
+        influence = pairs[:, 1] / sums[1] - pairs[:, 0] / sums[0]
+        power = float(influence @ influence)
+        chance = power / math.sqrt(len(pairs))
+        if len(pairs) <= _MOST_DRAWN and (power <= 0 or influence[1:] @ influence[:-1] <= chance):
+            break
+        even = len(pairs) // 2 * 2
+        joined = pairs[:even].reshape(-1, 2, 2).sum(axis=1)
+        joined[-1] += pairs[even:].sum(axis=0)
+        pairs = joined
+    return pairs

@@ -12,8 +12,7 @@ from tendonfmu.arrays import Numbers
 
 
 def evaluate(knots: Numbers, time: Numbers) -> tuple[Numbers, Numbers, Numbers]:
-    """Evaluate a curve and its derivatives."""
-    # knots: [k, 4] (rad); time: [N] (s); returns [N]
+    """Evaluate a curve and its derivatives. knots: [k, 4] (rad); time: [N] (s); returns [N]."""
     if len(knots) == 1:
         return np.full(len(time), knots[0, 1]), np.zeros(len(time)), np.zeros(len(time))
     piece = np.clip(np.searchsorted(knots[:, 0], time, side="right") - 1, 0, len(knots) - 2)

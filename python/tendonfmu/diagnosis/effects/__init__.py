@@ -1,11 +1,11 @@
 """Which effects a diagnosis knows, and how each is added to a description.
 
 - `table` has a row for each effect: words, places, shapes, terms.
-- `places`, `shapes` and `terms` hold what a row cannot say in a word; `words` puts sizes into words.
-- `candidate` says what a row is; `description_edit` changes descriptions.
+- `places` and `terms` hold what a row cannot say in a word; `words` puts sizes into words.
+- `candidate` says what a row is, and how it changes a description.
 """
 
-from tendonfmu.diagnosis.effects.candidate import Candidate, Column, Place, Term, Variant
+from tendonfmu.diagnosis.effects.candidate import Candidate, Column, Place, Term, Variant, Where
 from tendonfmu.diagnosis.effects.table import (
     BY_NAME,
     CALIBRATED,
@@ -32,5 +32,6 @@ __all__ = [
     "Place",
     "Term",
     "Variant",
+    "Where",
     "by_name",
 ]

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from tendonfmu.diagnosis.effects import places, shapes, terms, words
+from tendonfmu.diagnosis.effects import places, terms, words
 from tendonfmu.diagnosis.effects.candidate import Candidate
 from tendonfmu.diagnosis.effects.places import lacks_drop, lacks_sides, lacks_viscous, laws_where, nowhere
 from tendonfmu.errors import InputError
@@ -18,12 +18,11 @@ CANDIDATES: tuple[Candidate, ...] = (
             "The friction law here is the same at every speed, but the measured friction rises with it, as in "
             "grease or a seal. Look at the lubricant, at sealed bearings, and at whether it is worse when cold."
         ),
-        excited_by="strokes at several constant speeds, from slow to as fast as the hand goes",
         coordinate="velocity",
         possible_places=laws_where(lacks_viscous),
         make=terms.viscous,
         size=words.of("viscous {}", "viscous"),
-        find_shapes=shapes.laws_that_lack(lacks_viscous),
+        find_shapes=places.laws_that_lack(lacks_viscous),
         shared=True,
     ),
     Candidate(
@@ -34,12 +33,11 @@ CANDIDATES: tuple[Candidate, ...] = (
             "motion is jerky. Or it rises from standstill, as in rolling screws. Look at slow motion for stick "
             "and slip."
         ),
-        excited_by="slow motion: strokes at speeds from the threshold of motion up to a tenth of the usual speed",
         coordinate="velocity",
         possible_places=laws_where(lacks_drop),
         make=terms.stribeck,
         size=words.standstill,
-        find_shapes=shapes.stribeck,
+        find_shapes=places.stribeck,
         shared=True,
     ),
     Candidate(
@@ -49,12 +47,11 @@ CANDIDATES: tuple[Candidate, ...] = (
             "Moving one way costs more than moving the other way. Look for a worn or fouled flank, a preload in a "
             "screw or gear, a tendon that rubs at one edge in one direction only."
         ),
-        excited_by="the same strokes there and back, with pauses, at several speeds",
         coordinate="velocity",
         possible_places=laws_where(lacks_sides),
         make=terms.sides,
         size=words.sides,
-        find_shapes=shapes.laws_that_lack(lacks_sides),
+        find_shapes=places.laws_that_lack(lacks_sides),
     ),
     Candidate(
         name="edge_friction",
@@ -64,12 +61,11 @@ CANDIDATES: tuple[Candidate, ...] = (
             "that does not depend on how far the joint before bends the tendon. Look at the guide between the "
             "joints."
         ),
-        excited_by="strokes of this joint with the joint before at several angles, at two pretensions",
         coordinate="angle",
         possible_places=places.absent_edges,
         make=terms.edge,
         size=words.of("up to {} of the tendon force", "coulomb"),
-        find_shapes=shapes.edge,
+        find_shapes=places.edge,
         shared=True,
     ),
     Candidate(
@@ -79,7 +75,6 @@ CANDIDATES: tuple[Candidate, ...] = (
             "The tendon loses force at the pulley of this joint when it moves on to the joints beyond, and the "
             "model has no friction there. Look at the pulley's bearing and at whether the tendon slides on it."
         ),
-        excited_by="strokes of the joints beyond this one, with this joint at rest, at two pretensions",
         coordinate="velocity",
         possible_places=places.absent_pulleys,
         make=terms.absent_law(pulley=1.0),
@@ -93,7 +88,6 @@ CANDIDATES: tuple[Candidate, ...] = (
             "Friction in the joint that does not depend on the tendon forces, where the model has none. Look at "
             "the bearing, at seals and at parts that rub against each other when the joint moves without load."
         ),
-        excited_by="strokes of this joint at low pretension",
         coordinate="velocity",
         possible_places=places.joints_without("friction"),
         make=terms.absent_law(),
@@ -107,7 +101,6 @@ CANDIDATES: tuple[Candidate, ...] = (
             "The tendons press the joint's bearing together, and its friction grows with the sum of their forces; "
             "the model has no such part. Look at the bearing and at the pretension."
         ),
-        excited_by="strokes of this joint at two or more pretensions",
         coordinate="load",
         possible_places=places.joints_without("load_friction"),
         make=terms.absent_law(load=1.0),
@@ -121,14 +114,13 @@ CANDIDATES: tuple[Candidate, ...] = (
             "The tendon loses the same force at every tension, as in a seal, a tight sheath or a clamped guide. "
             "Look at whether friction remains without pretension."
         ),
-        excited_by="the same strokes at pretensions as different as the hand allows, the lowest first of all",
         coordinate="force",
         possible_places=places.passes_without_sheath,
         make=terms.row(coulomb=1),
         size=words.with_number(
             words.of("{} of friction", "coulomb"), "beyond", ", {} times as much at the joints beyond"
         ),
-        find_shapes=shapes.sheath,
+        find_shapes=places.sheath,
         shared=True,
     ),
     Candidate(
@@ -138,7 +130,6 @@ CANDIDATES: tuple[Candidate, ...] = (
             "Friction in the joint grows with the force of this tendon; the model has it constant, or growing with all "
             "tendons alike. Look at the bearing on the side of this tendon and at the pretension."
         ),
-        excited_by="strokes of this joint at two or more loads of this tendon",
         coordinate="force",
         possible_places=places.passes,
         make=terms.row(coulomb=1),
@@ -152,7 +143,6 @@ CANDIDATES: tuple[Candidate, ...] = (
             "A torque that grows with the joint's angle, as from a skin, a cover or a bundle of cables that bends "
             "with the joint. Let the joint go without tendon forces and see where it comes to rest."
         ),
-        excited_by="slow strokes of this joint over its whole range",
         coordinate="angle",
         possible_places=places.joints_without_spring,
         make=terms.spring,
@@ -166,7 +156,6 @@ CANDIDATES: tuple[Candidate, ...] = (
             "The spring at this joint is not linear: far from its rest angle it pulls more than in proportion, as "
             "folded plastic or a cable near its end does. Look at the cover at both ends of the joint's range."
         ),
-        excited_by="slow strokes of this joint up to both ends of its range",
         coordinate="angle",
         possible_places=places.joints,
         make=terms.row(stiffness=1),
@@ -180,7 +169,6 @@ CANDIDATES: tuple[Candidate, ...] = (
             "A torque that varies with the sine and cosine of the link's angle, at this joint and at those before "
             "it: the weight of what this joint turns. Turn the hand and see whether it changes."
         ),
-        excited_by="slow strokes over the whole range, then the same with the hand turned by 90 degrees",
         coordinate="angle",
         possible_places=places.joints,
         make=terms.row(sine=0, cosine=0),
@@ -193,7 +181,6 @@ CANDIDATES: tuple[Candidate, ...] = (
             "A torque in proportion to the joint's acceleration: the link's mass, or that of a motor behind a "
             "gear. It is negative if too much inertia was subtracted with a known load."
         ),
-        excited_by="fast starts and stops of this joint, with the same travel at different accelerations",
         coordinate="acceleration",
         possible_places=places.joints,
         make=terms.row(inertia=0),
@@ -206,7 +193,6 @@ CANDIDATES: tuple[Candidate, ...] = (
             "The mass that this joint accelerates moves towards its axis or away from it as the next joint turns, "
             "whose axis is perpendicular, as in a robot's shoulder. The next joint feels the centrifugal torque."
         ),
-        excited_by="fast starts and stops of this joint with the next one at several angles, and both in fast motion",
         coordinate="acceleration",
         possible_places=places.joints_before_others,
         make=terms.row(sine=0, cosine=0),
@@ -219,7 +205,6 @@ CANDIDATES: tuple[Candidate, ...] = (
             "After a reversal friction does not jump but grows over a short travel, because the surfaces and the "
             "tendon deform before they slide. Look at the torque against the travel since the reversal."
         ),
-        excited_by="many small reversals at low speed, with travels around the distance over which friction builds up",
         coordinate="travel",
         possible_places=nowhere,
         make=terms.row(),
@@ -233,7 +218,6 @@ CANDIDATES: tuple[Candidate, ...] = (
             "After a stop the torque that friction holds fades: cords creep, grease flows, contacts settle. Hold the "
             "finger after a stroke and watch the tendon forces."
         ),
-        excited_by="strokes with pauses of very different length, and the same strokes fast and slow",
         coordinate="travel",
         possible_places=nowhere,
         make=terms.row(),
@@ -247,7 +231,6 @@ CANDIDATES: tuple[Candidate, ...] = (
             "Between its pulleys a cord stretches with the force that friction makes it carry, so pulleys turn while "
             "joints stand. Look at how far a pulley near the motor turns when a joint is held and the motor pulls."
         ),
-        excited_by="changes of the pretension with the joints at rest",
         coordinate="force",
         possible_places=nowhere,
         make=terms.row(),
@@ -261,13 +244,12 @@ CANDIDATES: tuple[Candidate, ...] = (
             "All friction here grows or fades in proportion during the recording: warming up, running in, or "
             "lubricant that is squeezed out. Compare the same motion at the start and at the end."
         ),
-        excited_by="the same strokes at the start and at the end of a long recording, after a rest",
         coordinate="time",
         possible_places=places.rubbing_parts_and_all,
         # friction does not change its sign
         make=terms.row(-0.85, amplitude=0),
         size=words.drift,
-        find_shapes=shapes.drift,
+        find_shapes=places.drift,
     ),
     Candidate(
         name="force_gain",
@@ -276,7 +258,6 @@ CANDIDATES: tuple[Candidate, ...] = (
             "The true force of this tendon is larger or smaller than the measured one by a constant factor. Hang "
             "a known weight on the tendon and compare."
         ),
-        excited_by="slow changes of the pretension with the joints at rest, and motion at several tensions",
         coordinate="force",
         possible_places=places.tendons,
         # at -1 there would be no force
@@ -290,7 +271,6 @@ CANDIDATES: tuple[Candidate, ...] = (
             "The true force of this tendon is the measured one plus a constant. A constant torque looks like the "
             "bias, which takes it up: take all load off the tendon and read the sensor."
         ),
-        excited_by="nothing that moves: unload the tendon and read its sensor",
         coordinate="force",
         possible_places=places.tendons,
         make=terms.row(correction=0),
@@ -304,7 +284,6 @@ CANDIDATES: tuple[Candidate, ...] = (
             "a little, as on any new bench. Calibrate the force sensors with known weights, measure the arms, and "
             "compare the clocks; or go on with the corrected description."
         ),
-        excited_by="strokes of all joints at several pretensions",
         coordinate="force",
         possible_places=nowhere,
         make=terms.row(),
@@ -317,12 +296,11 @@ CANDIDATES: tuple[Candidate, ...] = (
             "The measured forces come later than the positions, or earlier where the delay is negative: filters, "
             "bus cycles, or clocks that differ. Look at how the two signals are sampled and filtered."
         ),
-        excited_by="many quick reversals at different speeds",
         coordinate="acceleration",
         possible_places=places.whole_finger,
         make=terms.delay,
         size=words.delay,
-        find_shapes=shapes.delay,
+        find_shapes=places.delay,
         common=True,
     ),
     Candidate(
@@ -332,7 +310,6 @@ CANDIDATES: tuple[Candidate, ...] = (
             "The tendon pulls at this joint with a longer or shorter lever than described. Measure the pulley's "
             "radius and add half the tendon's thickness."
         ),
-        excited_by="slow changes of this tendon's force with the joint at rest, at several pretensions",
         coordinate="force",
         possible_places=places.passes,
         make=terms.row(correction=0),
@@ -345,7 +322,6 @@ CANDIDATES: tuple[Candidate, ...] = (
             "The tendon's lever at this joint grows or shrinks as the joint bends, as where it lifts off its "
             "pulley. Watch the tendon's line at both ends of the joint's range."
         ),
-        excited_by="slow strokes of this joint over its whole range, at two pretensions",
         coordinate="angle",
         possible_places=places.passes,
         make=terms.row(slope=0),
@@ -358,14 +334,13 @@ CANDIDATES: tuple[Candidate, ...] = (
             "The tendon's lever varies as a sine of the pulley's angle: its centre is off its axis. Measure "
             "the run-out of the pulley."
         ),
-        excited_by="slow strokes of this joint over its whole range, the wider the better, at two pretensions",
         coordinate="angle",
         possible_places=places.passes,
         make=terms.row(sine=0, cosine=0),
         size=words.with_number(
             words.wave("the arm goes up and down by {}"), "turns", ", {} times per turn of the joint"
         ),
-        find_shapes=shapes.pulley,
+        find_shapes=places.pulley,
     ),
     Candidate(
         name="tendon_nonlinearity",
@@ -375,12 +350,11 @@ CANDIDATES: tuple[Candidate, ...] = (
             "wrong, and so is the velocity whenever the force changes. Pull the tendon against a stop and plot "
             "force over position."
         ),
-        excited_by="changes of the pretension over a wide range while the joints move, with joint encoders beside them",
         coordinate="force",
         possible_places=places.stretching_tendons,
         make=terms.secant("hardening"),
         size=words.of("the spring stiffens by {}", "hardening"),
-        find_shapes=shapes.hardening,
+        find_shapes=places.hardening,
     ),
     Candidate(
         name="joint_coupling",
@@ -390,7 +364,6 @@ CANDIDATES: tuple[Candidate, ...] = (
             "a cable or a linkage. Below 0 it pulls at the sum of the angles, as a strap across both joints does. "
             "Move one joint by hand and see whether the other one follows."
         ),
-        excited_by="strokes of this joint and the next one by turns, so that their angles differ",
         coordinate="angle",
         possible_places=places.joints_before_others,
         make=terms.row(stiffness=0),
@@ -399,7 +372,7 @@ CANDIDATES: tuple[Candidate, ...] = (
             "reaction",
             ", of which the next joint feels {} times as much",
         ),
-        find_shapes=shapes.either({}, {"reaction": 0.0}),
+        find_shapes=places.either({}, {"reaction": 0.0}),
     ),
     Candidate(
         name="backlash",
@@ -409,12 +382,11 @@ CANDIDATES: tuple[Candidate, ...] = (
             "gear, coupling or tendon fixing. Rock the drive back and forth by a little and see whether the joint "
             "follows."
         ),
-        excited_by="many small reversals, with travels around the play's width",
         coordinate="travel",
         possible_places=places.moving_parts,
         make=terms.secant("width"),
         size=words.of("a play of {}", "width"),
-        find_shapes=shapes.play,
+        find_shapes=places.play,
     ),
 )
 CALIBRATION = "calibration"  # many corrections at once: `calibration.py`

@@ -12,19 +12,23 @@ from dataclasses import replace
 from typing import Any
 
 from tendonfmu.arrays import Data
-from tendonfmu.diagnosis.effects.candidate import Column, Place, Shape, Term, Variant
-from tendonfmu.diagnosis.effects.description_edit import (
+from tendonfmu.diagnosis.effects.candidate import (
     ABSENT,
     COVER,
     POINTS,
     SIDES,
+    Column,
     Edit,
+    Place,
+    Shape,
+    Term,
+    Variant,
     apply_edits,
     law_columns,
     magnitudes_of,
     sides_at,
 )
-from tendonfmu.diagnosis.effects.places import largest_coulomb, law_path, laws_at
+from tendonfmu.diagnosis.effects.places import ANGLES, largest_coulomb, law_path, laws_at
 from tendonfmu.estimate import get_number
 from tendonfmu.model import DEFAULTS, EFFECT_NUMBERS, LEFT_OUT, MAGNITUDES, velocity_threshold
 
@@ -39,7 +43,6 @@ _DROP = 0.25  # of the Coulomb friction
 _LEAST_AMPLITUDE = -0.95  # of a Stribeck row: friction does not change its sign
 _ASYMMETRY = 0.2  # of the friction, from one direction to the other
 _BENT = 0.3  # of the friction, from the middle of the range to its end
-ANGLES = ("angle_low", "angle_middle", "angle_high")  # shape of an edge with working points, rad
 _LONGEST = EFFECT_NUMBERS["time_delay"]["delay"].most  # s
 
 # --- rows of `extensions` ---------------------------------------------------------------------------------------------
@@ -59,12 +62,12 @@ def row(least: float = -math.inf, **signs: int) -> Make:
     return make
 
 
-def secant(number: str, *, scaled: bool = True, most: float = math.inf) -> Make:
+def secant(number: str, *, most: float = math.inf) -> Make:
     """Return a row without a useful derivative at zero: its column is a finite difference."""
 
     def make(name: str, data: Data, place: Place, shape: Shape) -> Variant:
         def full(factor: float) -> dict[str, Any]:
-            value = float(shape[number]) * (factor if scaled else 1.0)
+            value = float(shape[number]) * factor
             return apply_edits(data, (), [_row(name, place, {number: min(max(value, -most), most)})], {})
 
         return Variant(data, shape, full=full)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.arrays import Data, Numbers
-from tendonfmu.diagnosis.span import Span
+from tendonfmu.diagnosis.samples import Span
 from tendonfmu.errors import InputError
 from tendonfmu.excite import Variation
 from tendonfmu.files import listed

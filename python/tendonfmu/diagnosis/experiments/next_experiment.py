@@ -19,15 +19,13 @@ import numpy as np
 
 from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.candidate_columns import CandidateColumns, Proposal, candidate_columns
-from tendonfmu.diagnosis.cause import Where
-from tendonfmu.diagnosis.effects import Candidate, Term
+from tendonfmu.diagnosis.effects import Candidate, Term, Where
 from tendonfmu.diagnosis.experiments.menu import Entry, combined, loads, motions, own_tension, recorded_of, tensions
 from tendonfmu.diagnosis.experiments.motion import expected_recording, perform
 from tendonfmu.diagnosis.extension_fit import number_columns
 from tendonfmu.diagnosis.names import Names, at_place, names_in
 from tendonfmu.diagnosis.result import Experiment
-from tendonfmu.diagnosis.samples import Samples
-from tendonfmu.diagnosis.span import Span, span_of
+from tendonfmu.diagnosis.samples import Samples, Span, span_of
 from tendonfmu.errors import InputError, InternalError
 from tendonfmu.estimate import EstimationError
 from tendonfmu.model import NativeError, moment_arms, number_of
@@ -79,7 +77,7 @@ class Answer:
 
     @property
     def where(self) -> Where:
-        return _where(self.question.cause)
+        return self.question.cause.where
 
 
 @dataclass(frozen=True)
@@ -116,8 +114,7 @@ def plan_experiments(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Experiments:
-    """Choose experiments from the menu."""
-    # noise: [n]
+    """Choose experiments from the menu. noise: [n]."""
     if not questions:
         return Experiments((), Experiment(""))
     if not recordings:
@@ -370,7 +367,7 @@ def _first_of_all(answers: Sequence[Answer], scores: Sequence[Sequence[Answer]],
     return Experiment(
         sentence=_sentence(separating, names),
         separates=tuple(
-            (answer.where, _where(answer.question.rival)) for answer in separating if answer.question.rival is not None
+            (answer.where, answer.question.rival.where) for answer in separating if answer.question.rival is not None
         ),
         makes_visible=tuple(answer.where for answer in separating if answer.question.rival is None),
         distance=min(answer.distance for answer in separating),
@@ -382,7 +379,8 @@ def _sentence(separating: Sequence[Answer], names: Names) -> str:
     """Say what to record for the first of the answers of one entry, and what one will know then."""
     first, *others = separating
     shown, rival = first.question.cause, first.question.rival
-    what = "; and ".join(_described(cause, names) for cause in (shown, rival) if cause is not None)
+    causes = [cause for cause in (shown, rival) if cause is not None]
+    what = "; and ".join(at_place(cause.candidate.title, cause.where, names) for cause in causes)
     if not first.separates:
         verb = "show this" if rival is None else "distinguish these two"
         return f"{NONE} {verb}: {what}. {shown.candidate.explanation}"
@@ -396,11 +394,3 @@ def _sentence(separating: Sequence[Answer], names: Names) -> str:
     rest = [f"{len(more) - LISTED} more"] * (len(more) > LISTED)
     also = f" It would also help to see: {'; '.join([*more[:LISTED], *rest])}." if more else ""
     return f"{first.entry.sentence} {purpose}{also}"
-
-
-def _described(cause: Term, names: Names) -> str:
-    return at_place(cause.candidate.title, _where(cause), names)
-
-
-def _where(cause: Term) -> Where:
-    return Where(cause.candidate.name, cause.place.joint, cause.place.tendon)

@@ -54,8 +54,7 @@ def converter(name: str) -> Converter:
 
 
 def convert_file(name: str, file: Path, options: Mapping[str, Any]) -> Columns:
-    """Convert a file of a foreign format."""
-    # returns [N]
+    """Convert a file of a foreign format to columns [N]."""
     convert = converter(name)
     known = CONVERTERS[name].options
     for option in options:

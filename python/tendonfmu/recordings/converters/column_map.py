@@ -260,9 +260,7 @@ def _read_joint(node: Node) -> tuple[dict[str, MappedColumn], Joint]:
             node.member(word).refuse(f"the log's column of it, in one of {', '.join(parts[word])}")
     name, cutoff = node.member("name"), node.member("velocity_cutoff")
     joint = Joint(
-        kind,
-        "joint" if name.absent else name.text("a name"),
-        None if cutoff.absent else cutoff.number(0.0, 1e6, "Hz"),
+        kind, "joint" if name.absent else name.text("a name"), None if cutoff.absent else cutoff.number(0.0, 1e6, "Hz")
     )
     columns = {
         word: _read_column(node.member(word), known) for word, known in parts.items() if not node.member(word).absent

@@ -31,7 +31,7 @@ FORMATS = {
     **dict.fromkeys((".h5", ".hdf5", ".hdf"), ("hdf5_log", "open_hdf5")),
     **dict.fromkeys((".feather", ".arrow", ".jsonl", ".ndjson"), ("parquet_log", "TableLog")),
     **dict.fromkeys((".npz", ".npy"), ("hdf5_log", "open_numpy")),
-    ".mcap": ("mcap_log", "McapLog"),
+    ".mcap": ("ros2_bag_log", "McapLog"),
     ".db3": ("ros2_bag_log", "open_bag"),
 }
 # formats that another program turns into one of these

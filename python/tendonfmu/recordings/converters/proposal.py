@@ -33,13 +33,7 @@ from tendonfmu.recordings.converters.guesses import (
     words_of,
 )
 from tendonfmu.recordings.converters.guesses import UNDECIDED as NOT_SURE
-from tendonfmu.recordings.converters.inspection import (
-    TOGETHER,
-    ClockSummary,
-    FieldSummary,
-    Inspection,
-    TopicSummary,
-)
+from tendonfmu.recordings.converters.inspection import TOGETHER, ClockSummary, FieldSummary, Inspection, TopicSummary
 from tendonfmu.recordings.converters.log import NUMBER, TIME
 
 REPORT_FORMAT = "tendonfmu-inspection-1"
