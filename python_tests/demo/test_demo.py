@@ -14,7 +14,7 @@ import pytest
 from command import DemoRun
 from real_browser import Elements, needs_nothing_else
 from repository_paths import ROOT
-from tendonfmu.demo import demo
+from tendonfmu.commands import demo
 
 HIDDEN = ROOT / "examples" / "demo_recording" / "two_joints_hidden.json"
 LARGEST = 4_000_000  # bytes of the page

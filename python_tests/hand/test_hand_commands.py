@@ -15,10 +15,10 @@ import tendonfmu as tf
 from command import Call
 from real_browser import Elements
 from small_hand import FINGERS, worn_columns, write_worn_hand
-from tendonfmu.hand import parts
-from tendonfmu.hand.page import PAGE, write_hand_page
-from tendonfmu.hand.parts import PartResult, split_files
-from tendonfmu.hand.report import (
+from tendonfmu.commands.hand import parts
+from tendonfmu.commands.hand.page import PAGE, write_hand_page
+from tendonfmu.commands.hand.parts import PartResult, split_files
+from tendonfmu.commands.hand.report import (
     CALIBRATION,
     calibration_rows,
 )
