@@ -12,22 +12,9 @@ import typer
 from tendonfmu import estimate, files, model
 from tendonfmu import recordings as recorded
 from tendonfmu import report as reporting
+from tendonfmu.commands import console
 from tendonfmu.commands import hand as hands
 from tendonfmu.commands.command import of_hand
-from tendonfmu.commands.console import (
-    NO,
-    check_table,
-    fail,
-    name_of,
-    print_json,
-    print_results,
-    progress_bar,
-    say,
-    say_files,
-    show,
-    warn,
-    write_table,
-)
 from tendonfmu.errors import InputError
 
 if TYPE_CHECKING:
@@ -46,11 +33,11 @@ def check_hand(file: Path, recordings: Sequence[Path] | None = None, progress: b
         hand = hands.read_hand(file)
     except InputError as refused:
         reason = str(refused)
-        print_json(lambda: {**head, "sound": False, "reason": reason})
-        fail(reason)
-        raise typer.Exit(NO) from None
+        console.print_json(lambda: {**head, "sound": False, "reason": reason})
+        console.fail(reason)
+        raise typer.Exit(console.NO) from None
     for line in hand.summary():
-        show(line)
+        console.show(line)
     findings = {
         part.name: [
             finding
@@ -62,10 +49,10 @@ def check_hand(file: Path, recordings: Sequence[Path] | None = None, progress: b
     }
     for name, found in findings.items():
         for finding in found:
-            warn(f"{name}: {finding.line()}")
+            console.warn(f"{name}: {finding.line()}")
     checked: dict[str, list[dict[str, Any]]] = {part.name: [] for part in hand.parts}
     lines = []
-    with progress_bar("recordings", progress if recordings else False, total=len(recordings)) as show_progress:
+    with console.progress_bar("recordings", progress if recordings else False, total=len(recordings)) as show_progress:
         for number, recording in enumerate(recordings, start=1):
             split, failed = hands.split_parts(hand, recording)
             for part in hand.parts:
@@ -80,18 +67,18 @@ def check_hand(file: Path, recordings: Sequence[Path] | None = None, progress: b
                 lines += [checked[part.name][-1]["verdict"], *(f"{each.severity}: {each.line()}" for each in seen)]
             show_progress(number)
     for line in lines:
-        show(line)
+        console.show(line)
     reports = {}
     for part in hand.parts:
         about = (part.finger.path, "finger", part.finger.summary())
         reports[part.name] = recorded.check_report(*about, findings[part.name], checked[part.name])
-    print_json(lambda: {**head, "sound": True, "summary": hand.summary(), "fingers": reports})
+    console.print_json(lambda: {**head, "sound": True, "summary": hand.summary(), "fingers": reports})
     strangers = [name for name, of_part in checked.items() if not all(report["belongs"] for report in of_part)]
     if strangers:
         problems = [each for name in strangers for report in checked[name] for each in report["findings"]]
         first = next(each["line"] for each in problems if each["severity"] == "error")
-        fail(f"{', '.join(strangers)}: recordings do not belong to {file} as it is; the first problem: {first}")
-        raise typer.Exit(NO)
+        console.fail(f"{', '.join(strangers)}: recordings do not belong to {file} as it is; the first problem: {first}")
+        raise typer.Exit(console.NO)
 
 
 @of_hand("run")
@@ -109,11 +96,11 @@ def run_hand(
         if given is not None:
             raise InputError(f"{model}: a hand, given with {name}; expected a finger, which it shows alone")
     hand = hands.read_hand(model)
-    check_table(output, recording, *hand.files)
+    console.check_table(output, recording, *hand.files)
     result = hands.run_hand(hand, recording, kinematics=options.kinematics)
-    write_table(output, result.columns())
+    console.write_table(output, result.columns())
     for name, of_part in result.results.items():
-        say(f"{name_of(output)}: {name}: {of_part.summary}")
+        console.say(f"{console.name_of(output)}: {name}: {of_part.summary}")
 
     def numbers() -> dict[str, Any]:
         fingers = {}
@@ -121,11 +108,11 @@ def run_hand(
             columns, source = result.results[part.name].columns(), hand.kinematics(part, options.kinematics)
             paths = (part.finger.path, recording)
             fingers[part.name] = reporting.run_report(
-                *paths, columns, part.finger, kinematics=source, output=name_of(output)
+                *paths, columns, part.finger, kinematics=source, output=console.name_of(output)
             )
         return {"format": "tendonfmu-hand-run-1", "hand": hand.name, "fingers": fingers}
 
-    print_json(numbers)
+    console.print_json(numbers)
 
 
 @of_hand("score")
@@ -140,7 +127,7 @@ def score_hand(
     """Score contact detection of all fingers and write one report."""
     hand = hands.read_hand(model)
     estimate.check_outputs(output, None, figures, [*hand.files, *recordings])
-    with progress_bar("fingers", progress, total=len(hand.parts)) as show_progress:
+    with console.progress_bar("fingers", progress, total=len(hand.parts)) as show_progress:
         scores, failed = hands.score_hand(hand, recordings, options, show_progress)
     rows = hands.score_rows(scores, failed)
     totals = {key: sum(getattr(score, key) for score in scores.values()) for key in ("events", "found", "false_alarms")}
@@ -148,14 +135,14 @@ def score_hand(
     report = {"format": "tendonfmu-hand-score-1", "hand": hand.name, **totals, "fingers": reports, "failed": failed}
     text = files.report_text(files.finite(report))
     files.write_text(output, text)
-    print_json(lambda: text)
+    console.print_json(lambda: text)
     # a recording of a finger has the finger's name after it, which stands before the warning already
     sentences = {name: [text.replace(f":{name}: ", ": ") for text in score.warnings] for name, score in scores.items()}
     _print_rows(hand.name, hands.SCORE_HEADINGS, rows, [], hands.shared_warnings(sentences))
-    say(f"{output}: {files.counted(len(scores), 'finger')}")
+    console.say(f"{output}: {files.counted(len(scores), 'finger')}")
     if figures is not None:
         for name, score in scores.items():
-            say_files(reporting.write_score_figures(score.scored, figures / name))
+            console.say_files(reporting.write_score_figures(score.scored, figures / name))
 
 
 @of_hand("calibrate")
@@ -190,18 +177,18 @@ def diagnose_hand(
 def _show_outcome(file: Path, compute: Callable[[Hand, Any], HandOutcome], progress: bool | None) -> None:
     """Print what comes out of all fingers. compute: takes the hand and the function of progress."""
     hand = hands.read_hand(file)
-    with progress_bar("fingers", progress, total=len(hand.parts)) as show_progress:
+    with console.progress_bar("fingers", progress, total=len(hand.parts)) as show_progress:
         outcome = compute(hand, show_progress)
     _print_rows(hand.name, outcome.headings, outcome.rows, [outcome.verdict], outcome.warnings)
-    say_files(outcome.written)
-    print_json(lambda: outcome.report)
+    console.say_files(outcome.written)
+    console.print_json(lambda: outcome.report)
 
 
 def _print_rows(
     name: str, headings: Sequence[str], rows: Sequence[PartRow], lines: Sequence[str], warnings: Sequence[str]
 ) -> None:
     table = (name, ("finger", *headings), [(row.name, *row.cells) for row in rows])
-    print_results([table], lines, left=headings[1], warnings=warnings)
+    console.print_results([table], lines, left=headings[1], warnings=warnings)
     for row in rows:
         if row.reason:
-            warn(f"{row.name}: left out: {row.reason}")
+            console.warn(f"{row.name}: left out: {row.reason}")

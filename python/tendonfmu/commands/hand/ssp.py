@@ -11,22 +11,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from tendonfmu import fmu
 from tendonfmu.commands.hand.description import WRIST, Hand, HandPart
 from tendonfmu.commands.hand.recordings import HandRecording, split_parts
 from tendonfmu.files import whole_file
-from tendonfmu.fmu import (
-    NOT_IN_XML,
-    SPACES,
-    SSD,
-    SSV,
-    component,
-    connection,
-    connectors,
-    members,
-    pack,
-    parameter_values,
-    xml_text,
-)
 
 START_VALUES = "resources/start_values.ssv"
 TENDONS = ("tendon_force", "tendon_position")
@@ -42,12 +30,12 @@ def build_hand_ssp(hand: Hand, output: Path, start: HandRecording | None = None)
     """Write the SSP package of a hand. start: recording of the hand whose first sample the FMUs start from."""
     content = {
         "SystemStructure.ssd": _system_structure(hand),
-        START_VALUES: parameter_values("start_values", _start_values(hand, start)),
+        START_VALUES: fmu.parameter_values("start_values", _start_values(hand, start)),
     }
     for part in hand.parts:
-        content[f"resources/{_fmu(part)}"] = pack(members(part.finger))
+        content[f"resources/{_fmu(part)}"] = fmu.pack(fmu.members(part.finger))
     with whole_file(output) as file:
-        file.write_bytes(pack(content))
+        file.write_bytes(fmu.pack(content))
     return output
 
 
@@ -57,12 +45,12 @@ def _fmu(part: HandPart) -> str:
 
 def _system_structure(hand: Hand) -> bytes:
     inside = [(part, list(_inputs(hand, part))) for part in hand.parts]
-    links = [connection(*source, part.name, name) for part, inputs in inside for name, source in inputs]
+    links = [fmu.connection(*source, part.name, name) for part, inputs in inside for name, source in inputs]
     outside = dict.fromkeys(source[1] for _, inputs in inside for _, source in inputs if not source[0])
     results = [(part, name) for part in hand.parts for name in _names(OUTPUTS, part.finger.joints)]
-    links += [connection(part.name, name, "", f"{part.name}_{name}") for part, name in results]
+    links += [fmu.connection(part.name, name, "", f"{part.name}_{name}") for part, name in results]
     elements = (
-        component(
+        fmu.component(
             part.name,
             _fmu(part),
             [
@@ -73,21 +61,21 @@ def _system_structure(hand: Hand) -> bytes:
         )
         for part, inputs in inside
     )
-    system = SSD.System(
-        connectors(
+    system = fmu.SSD.System(
+        fmu.connectors(
             [*((name, "input") for name in outside), *((f"{part.name}_{name}", "output") for part, name in results)]
         ),
-        SSD.Elements(*elements),
-        SSD.Connections(*links),
+        fmu.SSD.Elements(*elements),
+        fmu.SSD.Connections(*links),
         name="hand",
     )
-    experiment = SSD.DefaultExperiment(startTime="0.0", stopTime=str(SECONDS))
-    text = xml_text(
-        SSD.SystemStructureDescription(system, experiment, version="1.0", name=NOT_IN_XML.sub("?", hand.name))
+    experiment = fmu.SSD.DefaultExperiment(startTime="0.0", stopTime=str(SECONDS))
+    text = fmu.xml_text(
+        fmu.SSD.SystemStructureDescription(system, experiment, version="1.0", name=fmu.NOT_IN_XML.sub("?", hand.name))
     )
     named = text.replace(b"<ssd:Connection", b"<%b:Connection" % UNSEEN_BY_ECOS)
     named = named.replace(b"</ssd:Connection", b"</%b:Connection" % UNSEEN_BY_ECOS)
-    return named.replace(b" xmlns:ssd=", b' xmlns:%b="%b" xmlns:ssd=' % (UNSEEN_BY_ECOS, SPACES["ssd"].encode()), 1)
+    return named.replace(b" xmlns:ssd=", b' xmlns:%b="%b" xmlns:ssd=' % (UNSEEN_BY_ECOS, fmu.SPACES["ssd"].encode()), 1)
 
 
 def _inputs(hand: Hand, part: HandPart) -> Iterator[tuple[str, tuple[str, str]]]:
@@ -112,9 +100,9 @@ def _names(groups: tuple[str, ...], size: int) -> list[str]:
 
 def _taking_joints() -> Any:
     """Return the binding by which the FMU of a finger takes joint positions, for masters that read bindings."""
-    parameter = SSV.Parameter(SSV.Integer(value="2"), name=KINEMATICS)
-    values = SSV.ParameterSet(SSV.Parameters(parameter), version="1.0", name="start_values")
-    return SSD.ParameterBindings(SSD.ParameterBinding(SSD.ParameterValues(values)))
+    parameter = fmu.SSV.Parameter(fmu.SSV.Integer(value="2"), name=KINEMATICS)
+    values = fmu.SSV.ParameterSet(fmu.SSV.Parameters(parameter), version="1.0", name="start_values")
+    return fmu.SSD.ParameterBindings(fmu.SSD.ParameterBinding(fmu.SSD.ParameterValues(values)))
 
 
 def _start_values(hand: Hand, start: HandRecording | None) -> dict[str, float | int]:
