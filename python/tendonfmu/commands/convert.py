@@ -14,19 +14,8 @@ import typer
 
 from tendonfmu import files
 from tendonfmu import recordings as recorded
+from tendonfmu.commands import console
 from tendonfmu.commands.command import command
-from tendonfmu.commands.console import (
-    DASH,
-    check_second_file,
-    check_table,
-    name_of,
-    print_json,
-    print_results,
-    say,
-    warn,
-    write_blocks,
-    write_table,
-)
 from tendonfmu.errors import InputError, OutputError
 
 if TYPE_CHECKING:
@@ -148,13 +137,13 @@ def convert_files(
     else:
         _refuse_options(source, {"map": map_, "finger": finger, "episodes": episodes}, f"convert {TABLE}")
         report = _convert_data_set(source, file, output, options)
-    print_json(lambda: report)
+    console.print_json(lambda: report)
 
 
 def _convert_data_set(source: str, file: Path, output: Path, options: Mapping[str, float]) -> dict[str, Any]:
-    check_table(output, file)
+    console.check_table(output, file)
     table = recorded.convert_file(source, file, options)
-    write_table(output, table)
+    console.write_table(output, table)
     return _written(output, len(table["time"]), float(table["time"][-1] - table["time"][0]), [])
 
 
@@ -176,11 +165,11 @@ def _inspect(file: Path, output: Path | None, map_file: Path | None, episodes: s
     proposal = recorded.propose(inspection)
     _print_inspection(inspection, proposal)
     for note in (*inspection.notes, *proposal.notes):
-        warn(note)
+        console.warn(note)
     if output is not None:
         files.write_text(output, json.dumps(proposal.document, indent=1, ensure_ascii=False) + "\n")
         left = f'; "?" is left to you: {", ".join(proposal.undecided)}' if proposal.undecided else ""
-        say(f"{output}: a map of {files.counted(len(proposal.lines), 'column')}{left}")
+        console.say(f"{output}: a map of {files.counted(len(proposal.lines), 'column')}{left}")
     return recorded.inspection_document(inspection, proposal)
 
 
@@ -188,10 +177,10 @@ def _print_inspection(inspection: Inspection, proposal: Proposal) -> None:
     headings = ("field", "type", "unit", "values", "missing", "least", "most")
     for topic in inspection.topics:
         line = recorded.clock_line(topic, proposal.time_factor)
-        print_results([(topic.topic.name, headings, list(recorded.field_rows(topic)))], [line], "")
+        console.print_results([(topic.topic.name, headings, list(recorded.field_rows(topic)))], [line], "")
     orders = [order.line() for order in proposal.orders]
     columns = ("column", "field", "unit", "sure", "why")
-    print_results(
+    console.print_results(
         [("proposed map", columns, list(recorded.proposal_rows(proposal)))],
         [*orders, *recorded.unused_line(proposal)],
         "why",
@@ -208,10 +197,10 @@ def _convert_table(
         )
     if source == LEROBOT and file.resolve() in (output.resolve(), *output.resolve().parents):
         raise InputError(f"{output}: a place in the dataset {file}; expected another one")
-    if source == LEROBOT and output != DASH and output.suffix.lower() not in files.OUTPUTS:
+    if source == LEROBOT and output != console.DASH and output.suffix.lower() not in files.OUTPUTS:
         return _convert_episodes(file, output, map_file, episodes)
-    check_table(output, file, map_file)
-    check_second_file(finger, output, "recording and description", file, map_file)
+    console.check_table(output, file, map_file)
+    console.check_second_file(finger, output, "recording and description", file, map_file)
     if finger is not None:
         return _convert_with_finger(file, output, map_file, finger)
     conversion = recorded.Conversion(
@@ -248,7 +237,7 @@ def _convert_episodes(folder: Path, output: Path, map_file: Path, episodes: str 
             os.replace(Path(scratch, name), target / name)
     notes = [f"{folder}: {note} (episode {files.listed(numbers)})" for note, numbers in said.items()]
     _say_notes(notes)
-    say(f"{output}: {files.counted(len(made), 'recording')}")
+    console.say(f"{output}: {files.counted(len(made), 'recording')}")
     return {"format": CONVERSION, "recordings": list(made.values()), "notes": notes}
 
 
@@ -263,25 +252,25 @@ def _write_in_blocks(conversion: Conversion, output: Path) -> tuple[int, float]:
             count, last = count + len(columns["time"]), float(columns["time"][-1])
             yield columns
 
-    write_blocks(output, with_count())
+    console.write_blocks(output, with_count())
     return count, last - first
 
 
 def _convert_with_finger(file: Path, output: Path, map_file: Path, finger: Path) -> dict[str, Any]:
     log = recorded.convert_table(file, map_file)
     description = recorded.description_text(recorded.describe_joint(log))
-    write_table(output, log.columns)
+    console.write_table(output, log.columns)
     files.write_text(finger, description)
     time = log.columns["time"]
     report = _written(output, len(time), float(time[-1] - time[0]), log.notes)
-    say(f"{finger}: the machine described as a finger; `tendonfmu fit` estimates its numbers")
+    console.say(f"{finger}: the machine described as a finger; `tendonfmu fit` estimates its numbers")
     return report
 
 
 def _written(output: Path, count: int, duration: float, notes: list[str]) -> dict[str, Any]:
     """Say what was written and what was left out or recovered, and return it."""
     _say_notes(notes)
-    say(f"{name_of(output)}: {files.counted(count, 'sample')}, {duration:.3f} s")
+    console.say(f"{console.name_of(output)}: {files.counted(count, 'sample')}, {duration:.3f} s")
     return {
         "format": CONVERSION,
         "recording": str(output),
@@ -295,6 +284,6 @@ def _say_notes(notes: list[str]) -> None:
     for note in notes:
         # what the user should look at: doubtful units, and logs that were cut off
         if ": warning: " in note or re.search(" (is|are) kept$", note):
-            warn(note.replace(": warning: ", ": ", 1))
+            console.warn(note.replace(": warning: ", ": ", 1))
         else:
-            say(note)
+            console.say(note)

@@ -12,18 +12,8 @@ import typer
 
 from tendonfmu import diagnosis, excite, files, simulate
 from tendonfmu import report as reporting
+from tendonfmu.commands import console
 from tendonfmu.commands.command import Progress, Report, command, output_option
-from tendonfmu.commands.console import (
-    check_second_file,
-    check_table,
-    name_of,
-    print_json,
-    print_results,
-    progress_bar,
-    say,
-    warn,
-    write_table,
-)
 from tendonfmu.errors import InputError
 from tendonfmu.options import ExciteOptions
 
@@ -46,25 +36,27 @@ def excite_files(
     if discriminate is not None:
         _discriminate(context, finger, discriminate, output, options.rate, inputs)
         return
-    check_table(output, *inputs)
-    check_second_file(report, output, "motion and report", *inputs)
+    console.check_table(output, *inputs)
+    console.check_second_file(report, output, "motion and report", *inputs)
     subject = excite.training_motion.read_subject(finger)
     ranges = excite.training_motion.find_ranges(subject, options.range_)
     for span in ranges:
         if span.guessed:
-            warn(f"joint {span.name}: {span.source}; set it with --range {span.name}=LOW:HIGH")
+            console.warn(f"joint {span.name}: {span.source}; set it with --range {span.name}=LOW:HIGH")
     plan = excite.training_motion.plan_for(subject, ranges, options)
-    with progress_bar("judging the motion", progress) as show:
+    with console.progress_bar("judging the motion", progress) as show:
         result = excite.training_motion.excite(subject, ranges, plan, show)
-    write_table(output, result.motion.columns())
+    console.write_table(output, result.motion.columns())
     text = json.dumps(excite.training_motion.report(result, shlex.join(["tendonfmu", *sys.argv[1:]])), indent=1) + "\n"
     if report is not None:
         files.write_text(report, text)
-    print_json(lambda: text)
-    print_results(
+    console.print_json(lambda: text)
+    console.print_results(
         reporting.excite_text.tables(result), reporting.excite_text.lines(result), left="cannot be identified"
     )
-    say(f"{name_of(output)}: {files.counted(len(result.motion.time), 'row')}, {result.motion.time[-1]:g} s")
+    console.say(
+        f"{console.name_of(output)}: {files.counted(len(result.motion.time), 'row')}, {result.motion.time[-1]:g} s"
+    )
 
 
 def _discriminate(
@@ -78,11 +70,11 @@ def _discriminate(
             raise InputError(
                 f"{parameter.opts[0]}: given with --discriminate {folder}; expected no other option but --rate"
             )
-    check_table(output, *inputs)
+    console.check_table(output, *inputs)
     subject = excite.read_subject(finger)
     motion = diagnosis.discriminating_motion(folder, subject.finger.data, limits=subject.limits, rate=rate)
     columns = motion.columns()
-    write_table(output, columns)
-    print_results((), motion.lines(), left="")
-    print_json(lambda: motion.report(output))
-    say(f"{name_of(output)}: {files.counted(len(columns['time']), 'row')}, {columns['time'][-1]:g} s")
+    console.write_table(output, columns)
+    console.print_results((), motion.lines(), left="")
+    console.print_json(lambda: motion.report(output))
+    console.say(f"{console.name_of(output)}: {files.counted(len(columns['time']), 'row')}, {columns['time'][-1]:g} s")

@@ -1,6 +1,7 @@
-"""What the figures of a score show, ready to be drawn.
+"""What the figures of a score and of a tuning show, ready to be drawn.
 
-Torques and detection over time (fig. 8 of the paper), every event from its onset on, the ROC, and the delays.
+Torques and detection over time (fig. 8 of the paper), every event from its onset on, the ROC, and the delays; false
+alarms over the level of the bounds.
 """
 
 from __future__ import annotations
@@ -12,36 +13,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu import drawing as draw
 from tendonfmu.arrays import Numbers
-from tendonfmu.detect import GRACE, DetectionScore, Event, RocPoint, Scored, Track
-from tendonfmu.drawing import (
-    BLUE,
-    COLOURS,
-    DARK,
-    GREY,
-    SAND,
-    SKY,
-    VERMILION,
-    Panel,
-    Sheet,
-    Trace,
-    band,
-    bars,
-    curve,
-    dots,
-    heat,
-    lane,
-    mark,
-    panel,
-    stripes,
-)
+from tendonfmu.detect import GRACE, ContactTuning, DetectionScore, Event, RocPoint, Scored, Track, tune_report
 from tendonfmu.files import counted
 from tendonfmu.recordings import flagged_stretches
 from tendonfmu.report.numbers import with_ends
 from tendonfmu.report.page import write_figures
 from tendonfmu.statistics import intervals as statistics_intervals
 
-PAGE = "score.html"
+PAGE, TUNING_PAGE = "score.html", "tuning.html"
 SHOWN = 20.0  # s of the recording, where most events are
 JOINTS = 4  # drawn at most
 BEFORE, AFTER, LONGEST = 0.3, 0.3, 2.5  # s; an event's row before the onset, after the end, and at most after onset
@@ -49,7 +30,7 @@ TAIL = 2.0  # times the delay of 90 %; later events are counted, not drawn
 NAMED = (0.25, 0.5, 1.0, 2.0, 4.0)  # factors written beside their points
 _COLUMNS, _POINTS = 560, 5000
 _INTERVAL = "#B4BBC4"
-_HEAT = ("#FFFFFF", "#BBD9EE", SKY, BLUE, "#08306B")
+_HEAT = ("#FFFFFF", "#BBD9EE", draw.SKY, draw.BLUE, "#08306B")
 
 
 def write_score_figures(scored: Scored, folder: Path) -> dict[Path, str]:
@@ -59,7 +40,7 @@ def write_score_figures(scored: Scored, folder: Path) -> dict[Path, str]:
     return {page: "torques and detection over time, every event, thresholds and delays"}
 
 
-def score_sheets(scored: Scored) -> Iterator[Sheet]:
+def score_sheets(scored: Scored) -> Iterator[draw.Sheet]:
     """Make all figures that the recordings allow."""
     yield contact_sheet(scored)
     if scored.summary.events:
@@ -73,7 +54,7 @@ def score_sheets(scored: Scored) -> Iterator[Sheet]:
 # --- over time --------------------------------------------------------------------------------------------------------
 
 
-def contact_sheet(scored: Scored) -> Sheet:
+def contact_sheet(scored: Scored) -> draw.Sheet:
     """Show the `SHOWN` seconds with most events, or with most false alarms if there is no event."""
     counts = [_busiest(track, score) for track, score in zip(scored.tracks, scored.scores, strict=True)]
     most = max(range(len(counts)), key=lambda k: counts[k][:2])
@@ -86,18 +67,20 @@ def contact_sheet(scored: Scored) -> Sheet:
     labelled = flagged_stretches(time, track.label & shown)
     limits = float(time[rows[0]]), float(time[rows[-1]])
 
-    def over_time(title: str, unit: str, *curves: Trace) -> Panel:
-        alt, label = f"{title} over time", stripes(labelled, "", SAND, 0.3)
-        return panel(title, alt, "time (s)", unit, *curves, label, size="wide", x_limits=limits, zoom="time")
+    def over_time(title: str, unit: str, *curves: draw.Trace) -> draw.Panel:
+        alt, label = f"{title} over time", draw.stripes(labelled, "", draw.SAND, 0.3)
+        return draw.panel(title, alt, "time (s)", unit, *curves, label, size="wide", x_limits=limits, zoom="time")
 
-    def by_joint(torque: Numbers) -> list[Trace]:
-        return [curve(time[rows], 1e3 * torque[rows, j], names[j], COLOURS[k], 1.1) for k, j in enumerate(joints)]
+    def by_joint(torque: Numbers) -> list[draw.Trace]:
+        return [
+            draw.curve(time[rows], 1e3 * torque[rows, j], names[j], draw.COLOURS[k], 1.1) for k, j in enumerate(joints)
+        ]
 
-    sensor: list[Trace] = []
+    sensor: list[draw.Trace] = []
     if track.external is not None:
         sensor = [
-            curve(time[rows], 1e3 * track.external[rows, j], "reference sensor", COLOURS[k], 1.6, "dash", 0.7)
-            | {"key": ("dashed", DARK, 1.0)}
+            draw.curve(time[rows], 1e3 * track.external[rows, j], "reference sensor", draw.COLOURS[k], 1.6, "dash", 0.7)
+            | {"key": ("dashed", draw.DARK, 1.0)}
             for k, j in enumerate(joints)
         ]
     compensated = by_joint(track.outputs["compensated_torque"])
@@ -106,10 +89,10 @@ def contact_sheet(scored: Scored) -> Sheet:
         over_time("Compensated: estimate of the external torque", "torque (mN·m)", *sensor, *compensated),
     ]
     if track.force is not None:
-        force = curve(time[rows], np.abs(track.force[rows]), "", DARK, 1.0)
+        force = draw.curve(time[rows], np.abs(track.force[rows]), "", draw.DARK, 1.0)
         panels.append(over_time("Sensed force", "force (N)", force))
     panels.append(
-        panel(
+        draw.panel(
             "Detection",
             "When contact is labelled, and when it is detected",
             "time (s)",
@@ -122,23 +105,23 @@ def contact_sheet(scored: Scored) -> Sheet:
             zoom="time",
         )
     )
-    return Sheet("score", "contacts", f"{scored.subject.finger.name}: {track.recording.path.name}", panels)
+    return draw.Sheet("score", "contacts", f"{scored.subject.finger.name}: {track.recording.path.name}", panels)
 
 
 def _detection(
     track: Track, score: DetectionScore, shown: NDArray[np.bool_], labelled: list[tuple[float, float]]
-) -> Iterator[Trace]:
+) -> Iterator[draw.Trace]:
     """Draw labels and alarms, those that have a stretch."""
     time, alarm = track.recording.time, track.alarm & shown
     found, others = _by_event(track, score)
     for row, meaning, colour, spans in (
-        (0, "contact, as labelled", SAND, labelled),
-        (1, "alarm, event found", BLUE, flagged_stretches(time, alarm & found)),
-        (1, "alarm, event missed", GREY, flagged_stretches(time, alarm & others & ~found)),
-        (1, "alarm without contact", VERMILION, flagged_stretches(time, alarm & ~others & ~found)),
+        (0, "contact, as labelled", draw.SAND, labelled),
+        (1, "alarm, event found", draw.BLUE, flagged_stretches(time, alarm & found)),
+        (1, "alarm, event missed", draw.GREY, flagged_stretches(time, alarm & others & ~found)),
+        (1, "alarm without contact", draw.VERMILION, flagged_stretches(time, alarm & ~others & ~found)),
     ):
         if spans:
-            yield lane(spans, row, meaning, colour)
+            yield draw.lane(spans, row, meaning, colour)
 
 
 def _busiest(track: Track, score: DetectionScore) -> tuple[int, int, float]:
@@ -180,7 +163,7 @@ def _strongest(track: Track) -> list[int]:
 # --- events -----------------------------------------------------------------------------------------------------------
 
 
-def event_sheet(scored: Scored) -> Sheet:
+def event_sheet(scored: Scored) -> draw.Sheet:
     """Show every event as a row: found ones in order of delay, then missed ones, last those that began in an alarm."""
     events: list[tuple[Event, Track]] = [
         (event, track) for track, score in zip(scored.tracks, scored.scores, strict=True) for event in score.events
@@ -202,17 +185,17 @@ def event_sheet(scored: Scored) -> Sheet:
     rows, inside, half = np.arange(float(count)), length < end, 0.36
     most = float(np.nanquantile(torque, 0.99))
     ends, onset, top = np.array([-BEFORE, end]), "onset, and end of the event", np.array([-0.5, count - 0.5])
-    shown = panel(
+    shown = draw.panel(
         "Compensated torque, all joints",
         f"Compensated torque of {counted(count, 'event')} from their onset on, and the first alarm of each",
         "time from the onset (s)",
         "",
-        heat(torque, grid, rows, _HEAT, (0.0, most), "mN·m"),
-        bars(delay, rows - half, rows + half, "first alarm", VERMILION, 2.6),
-        bars(length[inside], rows[inside] - half, rows[inside] + half, onset, DARK, 1.6),
-        curve(np.zeros(2), top, onset, DARK, 1.6),
+        draw.heat(torque, grid, rows, _HEAT, (0.0, most), "mN·m"),
+        draw.bars(delay, rows - half, rows + half, "first alarm", draw.VERMILION, 2.6),
+        draw.bars(length[inside], rows[inside] - half, rows[inside] + half, onset, draw.DARK, 1.6),
+        draw.curve(np.zeros(2), top, onset, draw.DARK, 1.6),
         *(
-            curve(ends, np.full(2, each - 0.5), "", GREY, 1.1, "dash")
+            draw.curve(ends, np.full(2, each - 0.5), "", draw.GREY, 1.1, "dash")
             for each in np.unique(borders)
             if 0 < each < count
         ),
@@ -227,7 +210,7 @@ def event_sheet(scored: Scored) -> Sheet:
         x_limits=(-BEFORE, end),
         y_limits=(count - 0.5, -0.5),
     )
-    return Sheet("score", "events", f"{scored.subject.finger.name}: {counted(count, 'event')}", [shown])
+    return draw.Sheet("score", "events", f"{scored.subject.finger.name}: {counted(count, 'event')}", [shown])
 
 
 def _order(event: Event) -> tuple[int, float]:
@@ -247,7 +230,7 @@ def _row(track: Track, at: Numbers) -> Numbers:
 # --- ROC and delays ---------------------------------------------------------------------------------------------------
 
 
-def roc_sheet(scored: Scored, points: Sequence[RocPoint]) -> Sheet:
+def roc_sheet(scored: Scored, points: Sequence[RocPoint]) -> draw.Sheet:
     """Show found events against false alarms, and both over the factor on the thresholds."""
     events, minutes = counted(scored.summary.events, "event"), scored.summary.free_minutes
     factors = np.array([point.factor for point in points])
@@ -256,17 +239,17 @@ def roc_sheet(scored: Scored, points: Sequence[RocPoint]) -> Sheet:
     in_alarm = 100.0 * np.array([point.free_alarm_share for point in points])
     own = [int(np.argmin(np.abs(np.log(factors))))]
     named, least = _named(points), 60.0 / minutes  # one alarm in all free time, 1/h
-    against = panel(
+    against = draw.panel(
         "Events found, over false alarms",
         "Share of the events that are found over the rate of false alarms, at several factors on all thresholds",
         "false alarms per hour of free time",
         "events found (%)",
-        bars(rate, found_low, found_high, "", _INTERVAL),
-        bars(found, rate_low, rate_high, "", _INTERVAL, lying=True),
-        curve(rate, found, "", SKY, 1.5),
-        dots(rate, found),
-        dots(rate[named], found[named], texts=[f"×{factors[k]:g}" for k in named]),
-        dots(rate[own], found[own], "the description's thresholds", VERMILION),
+        draw.bars(rate, found_low, found_high, "", _INTERVAL),
+        draw.bars(found, rate_low, rate_high, "", _INTERVAL, lying=True),
+        draw.curve(rate, found, "", draw.SKY, 1.5),
+        draw.dots(rate, found),
+        draw.dots(rate[named], found[named], texts=[f"×{factors[k]:g}" for k in named]),
+        draw.dots(rate[own], found[own], "the description's thresholds", draw.VERMILION),
         size="medium",
         height=400,
         near_x=least,
@@ -274,18 +257,18 @@ def roc_sheet(scored: Scored, points: Sequence[RocPoint]) -> Sheet:
         y_limits=(-3.0, 103.0),
     )
     masked = 100.0 * np.array([point.masked / point.events for point in points])
-    over = panel(
+    over = draw.panel(
         "Over the factor on all thresholds",
         "Share of the events that are found, and of the free time in alarm, over a factor on all thresholds",
         "factor on all thresholds",
         "share (%)",
-        band(factors, found_low, found_high, "95 % interval"),
-        curve(factors, found, "events found", BLUE, 1.8),
-        curve(factors, in_alarm, "free time in alarm", VERMILION, 1.8),
-        curve(factors, masked, "missed: in alarm before", GREY, 1.4, "dash"),
-        dots(factors, found),
-        dots(factors, in_alarm, "", VERMILION),
-        mark(1.0),
+        draw.band(factors, found_low, found_high, "95 % interval"),
+        draw.curve(factors, found, "events found", draw.BLUE, 1.8),
+        draw.curve(factors, in_alarm, "free time in alarm", draw.VERMILION, 1.8),
+        draw.curve(factors, masked, "missed: in alarm before", draw.GREY, 1.4, "dash"),
+        draw.dots(factors, found),
+        draw.dots(factors, in_alarm, "", draw.VERMILION),
+        draw.mark(1.0),
         size="medium",
         height=400,
         x_ticks=[(factor, f"{factor:g}") for factor in (*NAMED, 8.0) if factors.min() <= factor <= factors.max()],
@@ -293,7 +276,7 @@ def roc_sheet(scored: Scored, points: Sequence[RocPoint]) -> Sheet:
         y_limits=(-3.0, 103.0),
     )
     title = f"{scored.subject.finger.name}: {events}, {minutes:.3g} min of free time"
-    return Sheet("score", "roc", title, [against, over])
+    return draw.Sheet("score", "roc", title, [against, over])
 
 
 def _named(points: Sequence[RocPoint]) -> list[int]:
@@ -305,7 +288,7 @@ def _named(points: Sequence[RocPoint]) -> list[int]:
     return list(places.values())
 
 
-def delay_sheet(scored: Scored) -> Sheet:
+def delay_sheet(scored: Scored) -> draw.Sheet:
     """Show the share of all events found within a time, with its interval."""
     delays = np.sort([event.delay for score in scored.scores for event in score.events if event.found])
     total, delay = scored.summary.events, scored.summary.delay
@@ -317,14 +300,17 @@ def delay_sheet(scored: Scored) -> Sheet:
     share, low, high = with_ends((statistics_intervals.share(k, total) for k in range(1, len(delays) + 1)), 100.0)
     top = min(100.0, 1.3 * float(high.max()))
     marks = ((median, f"median {1e3 * median:.0f} ms", ""), (ninety, f"90 % within {1e3 * ninety:.0f} ms", "dash"))
-    shown = panel(
+    shown = draw.panel(
         "Found so far",
         f"Share of all events found within a time: half within {1e3 * median:.0f} ms",
         "delay from the onset (ms)",
         "share of events (%)",
-        band(np.repeat(ms, 2)[1:], np.repeat(low, 2)[:-1], np.repeat(high, 2)[:-1], "95 % interval"),
-        curve(*_stairs(ms, share), "found so far", BLUE, 1.8),
-        *(curve(np.full(2, 1e3 * at), np.array([0.0, top]), name, VERMILION, 1.3, dash) for at, name, dash in marks),
+        draw.band(np.repeat(ms, 2)[1:], np.repeat(low, 2)[:-1], np.repeat(high, 2)[:-1], "95 % interval"),
+        draw.curve(*_stairs(ms, share), "found so far", draw.BLUE, 1.8),
+        *(
+            draw.curve(np.full(2, 1e3 * at), np.array([0.0, top]), name, draw.VERMILION, 1.3, dash)
+            for at, name, dash in marks
+        ),
         note=f"{later} later, up to {ms[-1]:.0f} ms →" if later else "",
         size="wide",
         height=330,
@@ -332,9 +318,53 @@ def delay_sheet(scored: Scored) -> Sheet:
         y_limits=(0.0, top),
     )
     title = f"{scored.subject.finger.name}: {len(delays)} of {counted(total, 'event')} found"
-    return Sheet("score", "delays", title, [shown])
+    return draw.Sheet("score", "delays", title, [shown])
 
 
 def _stairs(x: Numbers, y: Numbers) -> tuple[Numbers, Numbers]:
     """Return the line that rises to y at each x, from 0 on."""
     return np.concatenate([[0.0], np.repeat(x, 2)]), np.concatenate([[0.0], [0.0], np.repeat(y, 2)[:-1]])
+
+
+# --- tuning -----------------------------------------------------------------------------------------------------------
+
+
+def write_tune_figures(tuning: ContactTuning, folder: Path) -> dict[Path, str]:
+    """Write the page with the figure of a tuning."""
+    page = folder / TUNING_PAGE
+    write_figures(page, "tuning of contact detection", tuning.description_.name, [tail_sheet(tuning)])
+    return {page: "false alarms in motion that was kept out, over the level of the bounds"}
+
+
+def tail_sheet(tuning: ContactTuning) -> draw.Sheet:
+    """Show false alarms per hour over the factor on the bounds, in motion that was kept out."""
+    report = tune_report.build_report(tuning)
+    tail = sorted(report["tail"], key=lambda point: float(point["factor"]))
+
+    def column(name: str) -> Numbers:
+        return np.array([point[name] for point in tail], dtype=float)
+
+    factors, intervals = column("factor"), column("interval")
+    found, asked = report["kept_out"]["per_hour"], report["false_alarms_per_hour"]
+    limits = float(min(factors[0], 0.9)), float(max(factors[-1], 1.1))
+    shown = draw.panel(
+        "False alarms",
+        "False alarms per hour over a factor on the chosen bounds, in motion that was kept out",
+        "factor on the chosen bounds",
+        "false alarms per hour",
+        draw.band(factors, intervals[:, 0], intervals[:, 1], "95 % interval"),
+        draw.curve(factors, column("per_hour"), "kept out", draw.BLUE, 1.8),
+        draw.curve(
+            np.array(limits), np.full(2, asked), f"asked for: {asked:.3g} per hour", draw.VERMILION, 1.3, "dash"
+        ),
+        draw.dots(np.ones(1), np.array([found]), f"found: {found:.3g} per hour", draw.DARK),
+        draw.mark(1.0),
+        size="wide",
+        height=480,
+        log_x=True,
+        near_y=60.0 / report["minutes"],
+        x_limits=limits,
+        y_limits=(0.0, 1.1 * float(max(intervals.max(), found))),
+    )
+    title = f"{report['finger']}: {report['minutes']:.0f} min of free motion, {report['method']}"
+    return draw.Sheet("tune", "tail", title, [shown])
