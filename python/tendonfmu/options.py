@@ -103,11 +103,12 @@ class Choice:
 
 @dataclass(eq=False, repr=False)
 class Kind:
-    """A value of one of `types`; the first is the type on the command line."""
+    """A value of one of `types`; the first is that on the command line. Without `checked` whoever uses it checks."""
 
     words: str
     types: tuple[Any, ...]
     optional: bool = False
+    checked: bool = True
 
     def __str__(self) -> str:
         return self.words + (" or None" if self.optional else "")
@@ -121,7 +122,7 @@ class Kind:
         """Return the value. Raises ValueError if it has another type."""
         if bool in self.types and type(value).__name__ in ("bool", "bool_"):  # of numpy, which takes 0.1 s to import
             return bool(value)
-        if not (isinstance(value, self.types) or (value is None and self.optional)):
+        if self.checked and not (isinstance(value, self.types) or (value is None and self.optional)):
             raise ValueError
         return value
 
@@ -141,8 +142,10 @@ class Several:
         """Type on the command line."""
         return list[self.item.type] | None  # type: ignore[name-defined]
 
-    def read(self, value: Any) -> list[Any]:
-        """Return a list. Raises ValueError if there is anything else in it."""
+    def read(self, value: Any) -> Any:
+        """Return a list, or what is not checked as it is. Raises ValueError if there is anything else in the list."""
+        if isinstance(self.item, Kind) and not self.item.checked:
+            return value
         alone = isinstance(value, str | os.PathLike) or not isinstance(value, Iterable)
         items = [self.item.read(item) for item in ([value] if alone else value)]
         # scikit-learn's clone wants back the very list that it passed
@@ -150,47 +153,14 @@ class Several:
         return value if unchanged else items
 
 
-@dataclass(eq=False, repr=False)
-class Source(Kind):
-    """A recording, which whoever reads it checks; the first type is what the command line takes."""
-
-    def read(self, value: Any) -> Any:
-        """Return the value."""
-        return value
-
-
-@dataclass(eq=False, repr=False)
-class Sources(Several):
-    """Recordings, which whoever reads them checks; `item` is what the command line takes."""
-
-    def read(self, value: Any) -> Any:
-        """Return the value."""
-        return value
-
-
-@dataclass(eq=False, repr=False)
-class Function:
-    """A function of Python, or None. The command line has none."""
-
-    type: ClassVar[Any] = None
-
-    def __str__(self) -> str:
-        return "a function or None"
-
-    def read(self, value: Any) -> Any:
-        """Return the value. Raises ValueError if it cannot be called."""
-        if not (value is None or callable(value)):
-            raise ValueError
-        return value
-
-
 File = str | os.PathLike[str]
 _COLUMN = Kind("the name of a column", (str,), optional=True)
 _PATH = Kind("a path", (Path, str, os.PathLike), optional=True)
 _TEXTS = Several("a text or a list of texts", Kind("a text", (str,)))
 _PATHS = Several("a path or a list of paths", Kind("a path", (Path, str, os.PathLike)))
-_RECORDING = Source("a recording, DataFrame or file", (Path,), optional=True)
-_RECORDINGS = Sources("a recording, DataFrame or file, or a list of them", Kind("a path", (Path,)))
+_RECORDING = Kind("a recording, DataFrame or file", (Path,), optional=True, checked=False)
+_RECORDINGS = Several("a recording, DataFrame or file, or a list of them", Kind("", (Path,), checked=False))
+_FUNCTION = Kind("a function", (Callable,), optional=True)
 _YES, _YES_OR_NONE = Kind("True or False", (bool,)), Kind("True, False", (bool,), optional=True)
 
 
@@ -201,7 +171,7 @@ _YES, _YES_OR_NONE = Kind("True or False", (bool,)), Kind("True, False", (bool,)
 class Option:
     """What an option takes, and how the command line shows it."""
 
-    values: Number | Choice | Kind | Several | Function
+    values: Number | Choice | Kind | Several
     help: str | None = None
     metavar: str | None = None
     names: tuple[str, ...] = ()  # on the command line, where that of the field is not enough
@@ -214,7 +184,7 @@ class Option:
         return f"{words[:1].upper()}{words[1:]} ({self.values}; default {usual[0]})."
 
 
-def option(default: Any, values: Number | Choice | Kind | Several | Function, help: str = "", **shown: Any) -> Any:
+def option(default: Any, values: Number | Choice | Kind | Several, help: str = "", **shown: Any) -> Any:
     """Make the field of an option, which is given by its name."""
     return field(default=default, metadata={"option": Option(values, help or None, **shown)})
 
@@ -276,7 +246,7 @@ def keywords(
     return decorate
 
 
-def checked(name: str, value: Any, values: Number | Choice | Kind | Several | Function) -> Any:
+def checked(name: str, value: Any, values: Number | Choice | Kind | Several) -> Any:
     """Return the value of an option as a plain one."""
     try:
         return values.read(value)
@@ -353,7 +323,7 @@ def _recordings(help: str, metavar: str = "RECORDING", default: Any = ()) -> Any
 
 
 def _progress(help: str) -> Any:
-    return option(None, Function(), help, shown=False)
+    return option(None, _FUNCTION, help, shown=False)
 
 
 # --- the commands -----------------------------------------------------------------------------------------------------
