@@ -19,9 +19,9 @@ from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Annotated, Any
 
-from tendonfmu.calibration import DIAGNOSIS
-from tendonfmu.calibration import PAGE as CALIBRATION_PAGE
-from tendonfmu.calibration import text as calibration_text
+from tendonfmu import calibration, estimate
+from tendonfmu import drawing as draw
+from tendonfmu import report as reporting
 from tendonfmu.commands.build import build
 from tendonfmu.commands.calibrate import CalibrateResult, calibrate
 from tendonfmu.commands.command import Progress, command, output_option
@@ -29,33 +29,8 @@ from tendonfmu.commands.console import Bar, print_json, print_results, say, say_
 from tendonfmu.commands.fit import fit
 from tendonfmu.commands.run import run
 from tendonfmu.commands.score import score
-from tendonfmu.drawing import Sheet
-from tendonfmu.estimate import ESTIMATION_MISSING, HAS_ESTIMATION
 from tendonfmu.files import check_output_folder, whole_file, write_text
 from tendonfmu.model import read_finger
-from tendonfmu.report import (
-    Table,
-    Tile,
-    detect_text,
-    diagnosis_page,
-    diagnosis_sheets,
-    diagnosis_text,
-    fit_page,
-    fit_text,
-    law_sheets,
-    make_folder,
-    render,
-    residual_tables,
-    rounded,
-    run_report,
-    run_sheets,
-    score_sheets,
-    together,
-    torque_sheets,
-    write_fit_page,
-    write_run_page,
-    write_score_figures,
-)
 from tendonfmu.tasks import forget_steps
 
 FORMAT = "tendonfmu-demo-2"
@@ -82,10 +57,10 @@ class Chapter:
     """What a chapter shows, in the terminal and on the page."""
 
     name: str
-    tile: Tile  # its most important number
-    tables: Sequence[Table]
+    tile: reporting.Tile  # its most important number
+    tables: Sequence[reporting.Table]
     lines: Sequence[str]
-    sheets: Sequence[Sheet]
+    sheets: Sequence[draw.Sheet]
     page: str  # the page of its command, in the folder
 
     @property
@@ -98,10 +73,12 @@ class Story:
 
     def __init__(self, folder: Path) -> None:
         check_output_folder(folder)
-        make_folder(folder)
+        reporting.make_folder(folder)
         self.folder = folder
-        self.names = [name for name in TITLES if HAS_ESTIMATION or name not in ESTIMATING]
-        self.missing = "" if HAS_ESTIMATION else f"{', '.join(ESTIMATING)} are left out: {ESTIMATION_MISSING}"
+        self.names = [name for name in TITLES if estimate.HAS_ESTIMATION or name not in ESTIMATING]
+        self.missing = (
+            "" if estimate.HAS_ESTIMATION else f"{', '.join(ESTIMATING)} are left out: {estimate.ESTIMATION_MISSING}"
+        )
         self.chapters: list[Chapter] = []
         self.files: dict[Path, str] = {}  # each file with its content in words
         self._calibrated: CalibrateResult
@@ -125,7 +102,7 @@ class Story:
         sheets = [replace(sheet, section=each.name) for each in self.chapters for sheet in each.sheets]
         written = [(path.relative_to(self.folder).as_posix(), what) for path, what in self.files.items()]
         content = {"chapters": self.chapters, "missing": self.missing, "files": written}
-        write_text(page, render("story.html.jinja", sheets, **content))
+        write_text(page, reporting.render("story.html.jinja", sheets, **content))
         self.files = {page: "the whole demo, for a browser", **self.files}
 
     def report(self) -> dict[str, Any]:
@@ -156,23 +133,34 @@ class Story:
         phase("writing", 0, None)
         self.files |= self._calibrated.write(folder)
         report = self._calibrated.report
-        lines = [*(f"warning: {sentence}" for sentence in report["warnings"]), *calibration_text.lines(report)]
-        tile = Tile(*next(calibration_text.tiles(report)))
-        sheet = next(calibration_text.sheets(self._calibrated.calibration))
-        page = f"{folder.name}/{CALIBRATION_PAGE}"
-        return Chapter("calibrate", tile, list(calibration_text.tables(report)), lines, [sheet], page)
+        lines = [*(f"warning: {sentence}" for sentence in report["warnings"]), *calibration.text.lines(report)]
+        tile = reporting.Tile(*next(calibration.text.tiles(report)))
+        sheet = next(calibration.text.sheets(self._calibrated.calibration))
+        page = f"{folder.name}/{calibration.PAGE}"
+        return Chapter("calibrate", tile, list(calibration.text.tables(report)), lines, [sheet], page)
 
     def _diagnose(self, data: Path, phase: Phase) -> Chapter:
         """Show what the calibration has found."""
         del data, phase
         found = self._calibrated.calibration.diagnosis
         assert found is not None, "no step was there to be repeated"
-        factor, unit = diagnosis_text.unit_of(found)
-        errors = (rounded(factor * together(model.test_rms)) for model in (found.nominal, found.extended))
-        tile = Tile(" → ".join(errors), unit, "error on held-out parts, before and after the causes are built in")
-        sheets = [sheet for sheet in diagnosis_sheets(found) if sheet.section != "views"]
-        tables, lines = list(diagnosis_text.tables(found)), list(diagnosis_text.lines(found))
-        return Chapter("diagnose", tile, tables, lines, sheets, f"calibration/{DIAGNOSIS}/{diagnosis_page.PAGE}")
+        factor, unit = reporting.diagnosis_text.unit_of(found)
+        errors = (
+            reporting.rounded(factor * reporting.together(model.test_rms)) for model in (found.nominal, found.extended)
+        )
+        tile = reporting.Tile(
+            " → ".join(errors), unit, "error on held-out parts, before and after the causes are built in"
+        )
+        sheets = [sheet for sheet in reporting.diagnosis_sheets(found) if sheet.section != "views"]
+        tables, lines = list(reporting.diagnosis_text.tables(found)), list(reporting.diagnosis_text.lines(found))
+        return Chapter(
+            "diagnose",
+            tile,
+            tables,
+            lines,
+            sheets,
+            f"calibration/{calibration.DIAGNOSIS}/{reporting.diagnosis_page.PAGE}",
+        )
 
     def _fit(self, data: Path, phase: Phase) -> Chapter:
         fitted = fit(
@@ -183,16 +171,25 @@ class Story:
         )
         phase("drawing the fit", 0, None)
         folder, picture = self.folder / "fit", fitted.estimator.picture()
-        self.files |= write_fit_page(picture, folder)
+        self.files |= reporting.write_fit_page(picture, folder)
         fitted.write(folder / "fitted.json")
         self.files[folder / "fitted.json"] = "the fitted description"
-        residuals = residual_tables(picture.report, picture.fitted.joint_names)
-        start, end = (rounded(value) for value in (residuals[-1].all.start, residuals[-1].all.fitted))
-        tile = Tile(f"{start} → {end}", residuals[-1].unit, "error on an unseen recording, before and after the fit")
-        sheets = [list(torque_sheets(picture))[-1]]
-        sheets += [sheet for sheet in law_sheets(picture) if sheet.name == "laws_joints"]
-        lines = list(fit_text.summary_sentences(picture, residuals))
-        return Chapter("fit", tile, [next(fit_text.tables(fitted.estimator))], lines, sheets, f"fit/{fit_page.PAGE}")
+        residuals = reporting.residual_tables(picture.report, picture.fitted.joint_names)
+        start, end = (reporting.rounded(value) for value in (residuals[-1].all.start, residuals[-1].all.fitted))
+        tile = reporting.Tile(
+            f"{start} → {end}", residuals[-1].unit, "error on an unseen recording, before and after the fit"
+        )
+        sheets = [list(reporting.torque_sheets(picture))[-1]]
+        sheets += [sheet for sheet in reporting.law_sheets(picture) if sheet.name == "laws_joints"]
+        lines = list(reporting.fit_text.summary_sentences(picture, residuals))
+        return Chapter(
+            "fit",
+            tile,
+            [next(reporting.fit_text.tables(fitted.estimator))],
+            lines,
+            sheets,
+            f"fit/{reporting.fit_page.PAGE}",
+        )
 
     # --- chapters: the index finger -----------------------------------------------------------------------------------
 
@@ -205,12 +202,14 @@ class Story:
         self.files[fmu] = "the calibrated index finger's FMU"
         pushes = data / f"{PUSHES}.parquet"
         after, before = (score(data / finger, pushes, progress=show) for finger in (INDEX, GIVEN))
-        self.files |= write_score_figures(after.scored, self.folder / "score")
-        tile = Tile(f"{after.found} of {after.events}", "", "pushes found, without a touch sensor")
+        self.files |= reporting.write_score_figures(after.scored, self.folder / "score")
+        tile = reporting.Tile(f"{after.found} of {after.events}", "", "pushes found, without a touch sensor")
         as_given = f"as given: {before.found} of {before.events} pushes found"
-        lines = [*detect_text.score_lines(after.scored), as_given]
-        sheet = next(score_sheets(after.scored))
-        return Chapter("detect", tile, list(detect_text.score_tables(after.scored)), lines, [sheet], "score/score.html")
+        lines = [*reporting.detect_text.score_lines(after.scored), as_given]
+        sheet = next(reporting.score_sheets(after.scored))
+        return Chapter(
+            "detect", tile, list(reporting.detect_text.score_tables(after.scored)), lines, [sheet], "score/score.html"
+        )
 
     def _run(self, data: Path, phase: Phase) -> Chapter:
         finger, fmu = read_finger(data / INDEX), self.folder / FMU
@@ -220,11 +219,13 @@ class Story:
             result = run(fmu, data / f"{name}.parquet", progress=lambda done: phase("running the FMU", done, None))
             result.write(outputs)
             table = result.columns()
-            report = run_report(fmu, Path(f"{name}.parquet"), table, finger, kinematics=1, output=outputs.name)
-            page = write_run_page(self.folder / f"{name}.html", report, table)
+            report = reporting.run_report(
+                fmu, Path(f"{name}.parquet"), table, finger, kinematics=1, output=outputs.name
+            )
+            page = reporting.write_run_page(self.folder / f"{name}.html", report, table)
             self.files |= {outputs: f"the FMU's outputs over {name}.parquet", page: "the same, for a browser"}
             force = f"{result.recording.groups['tendon_force'].mean():.0f} N"
-            (joint,) = (sheet for sheet in run_sheets(table, finger.joint_names, []) if sheet.title == SHOWN)
+            (joint,) = (sheet for sheet in reporting.run_sheets(table, finger.joint_names, []) if sheet.title == SHOWN)
             sheets.append(replace(joint, caption=f"{SHOWN.replace('_', ' ')}, free motion at {force}"))
             lines.append(f"free motion at {force}: {result.summary}")
             headings.append(f"at {force}")
@@ -232,7 +233,7 @@ class Story:
         rows = [tuple(row) for row in zip(finger.joint_names, *map(_left, reports), strict=True)]
         title = f"{finger.name}: joint torque → left after compensation, rms in mN·m"
         joint = reports[0]["joints"][finger.joint_names.index(SHOWN)]
-        tile = Tile(_pair(joint), "mN·m", "torque at the base of the finger, before and after compensation")
+        tile = reporting.Tile(_pair(joint), "mN·m", "torque at the base of the finger, before and after compensation")
         return Chapter("run", tile, [(title, tuple(headings), rows)], lines, sheets, f"{FREE}.html")
 
 
