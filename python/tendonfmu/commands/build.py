@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from tendonfmu import fmu, model, simulate
-from tendonfmu import recordings as recorded
 from tendonfmu.commands.command import Subject, command, output_option
 from tendonfmu.commands.console import print_json, say
 from tendonfmu.errors import InputError, InputWarning
@@ -110,6 +109,8 @@ def _related(
     finger: Finger, reference: RecordingSource | None, sets: Sequence[Path], options: BuildOptions
 ) -> tuple[dict[str, bytes], dict[str, float] | None, list[str]]:
     """Return files and experiment of a recording and parameter sets, and a sentence for each doubt about them."""
+    from tendonfmu import recordings as recorded  # here: most FMUs are packed without one
+
     files = fmu.parameter_sets(sets, finger)
     if reference is None:
         return fmu.related_members(files), None, []
