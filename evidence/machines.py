@@ -274,10 +274,10 @@ def published(_folder: Path, _workers: int) -> Figures:
     recordings = [emps_run(name) for name in (PLAIN, PULSES)]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        fit = partial(tf.fit, recordings=recordings[0], kinematics=ENCODER)
-        symmetric = fit(HERE / "emps" / "symmetric.json").finger
+        plain, pulled = HERE / "emps" / "symmetric.json", HERE / "emps" / "asymmetric.json"
+        symmetric = tf.fit(plain, recordings[0], kinematics=ENCODER).finger
         # with two sides of the law the offset cannot be told from the difference of their Coulomb parts
-        asymmetric = fit(HERE / "emps" / "asymmetric.json", fix="bias.initial_torque").finger
+        asymmetric = tf.fit(pulled, recordings[0], kinematics=ENCODER, fix="bias.initial_torque").finger
     law, bias = symmetric.data["joints"][0]["friction"], symmetric.data["bias"]
     numbers = (law["viscous"], law["coulomb"], bias["initial_torque"][0])
     fingers = {"symmetric": symmetric, "asymmetric": asymmetric, "with its causes": HERE / "emps" / "extended.json"}

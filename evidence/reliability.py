@@ -22,7 +22,7 @@ from evidence.cases import EXAMPLES
 from evidence.part import Figures, Part
 
 DEMO = EXAMPLES / "demo_recording"
-COMMAND = [sys.executable, "-m", "tendonfmu.cli"]
+COMMAND = [sys.executable, "-m", "tendonfmu"]
 SECONDS = 12.0  # of motion: commands have to end within seconds
 COMMANDS: dict[str, list[str]] = {
     "build": ["build", "finger.json", "-o", "out/finger.fmu"],

@@ -93,13 +93,13 @@ def kind(request: pytest.FixtureRequest) -> Kind:
 @pytest.fixture(scope="session")
 def demo_run(tmp_path_factory: pytest.TempPathFactory) -> DemoRun:
     """`tendonfmu demo`. Its calibration is that of any user with the same finger and recordings."""
-    import tendonfmu.cli
+    import tendonfmu
 
     def run(folder: Path) -> None:
         before = Path.cwd()
         os.chdir(folder)
         try:
-            answer = run_script(Path(tendonfmu.cli.__file__).with_name("__main__.py"), "demo")
+            answer = run_script(Path(tendonfmu.__file__).with_name("__main__.py"), "demo")
         finally:
             os.chdir(before)
         (folder / "answer.json").write_text(json.dumps(asdict(answer)), encoding="utf-8")
@@ -125,11 +125,11 @@ def runner(request: pytest.FixtureRequest) -> Runner:
 @pytest.fixture
 def call(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> Call:
     """Runs `tendonfmu ARGUMENTS` in an empty folder and gives its exit status and both streams."""
-    from tendonfmu.cli import main
+    from tendonfmu.commands.program import main
 
     monkeypatch.chdir(tmp_path)
     # It leaves without waiting for threads, which may be another test's: the process of the tests would end.
-    monkeypatch.setattr("tendonfmu.cli.program.leave", sys.exit)
+    monkeypatch.setattr("tendonfmu.commands.program.leave", sys.exit)
 
     def run(*arguments: str | Path) -> Answer:
         monkeypatch.setattr(sys, "argv", ["tendonfmu", *map(str, arguments)])

@@ -78,7 +78,7 @@ def servo_history(folder: Path) -> None:
 
 
 def tendonfmu(folder: Path, *words: str | Path) -> None:
-    command = [sys.executable, "-m", "tendonfmu.cli", *map(str, words)]
+    command = [sys.executable, "-m", "tendonfmu", *map(str, words)]
     subprocess.run(command, cwd=folder, check=True, stdout=subprocess.DEVNULL)
 
 

@@ -208,7 +208,7 @@ def calibrated(folder: Path, number: int) -> Path:
             for kinds in (pushed_fingers.FREE, pushed_fingers.PUSHED)
         )
         description = pushed_fingers.description_file(folder, number)
-        command = [sys.executable, "-m", "tendonfmu.cli", "calibrate", str(description), *free, "--pushes", *pushed]
+        command = [sys.executable, "-m", "tendonfmu", "calibrate", str(description), *free, "--pushes", *pushed]
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         subprocess.run([*command, "-o", str(into), "--no-progress"], check=True)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)

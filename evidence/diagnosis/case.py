@@ -47,7 +47,7 @@ def diagnosed(case: Case) -> tuple[dict[str, Any], float]:
     """
     with tempfile.TemporaryDirectory() as name:
         folder, before = Path(name), _seconds_of_children()
-        command = [sys.executable, "-m", "tendonfmu.cli", "diagnose", *case.write(folder), "-o", "report"]
+        command = [sys.executable, "-m", "tendonfmu", "diagnose", *case.write(folder), "-o", "report"]
         ended = subprocess.run(
             [*command, "--no-progress"],
             cwd=folder,

@@ -22,8 +22,8 @@ from evidence.part import Figures
 from evidence.table import NOTHING, Row, number, table, where
 from tendonfmu import run
 from tendonfmu.arrays import Numbers
+from tendonfmu.commands.fit import fit
 from tendonfmu.estimate import FitWarning
-from tendonfmu.interface.fitting import fit
 from tendonfmu.model import Finger, finger_from_data, read_finger, without_learning
 from tendonfmu.recordings import Held, prepare, read_recording
 

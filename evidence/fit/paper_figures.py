@@ -109,7 +109,7 @@ def simulated(rig: str, folder: Path) -> tuple[Path, Recording, pd.DataFrame]:
     """The recording's file, itself, and the truth at the same times."""
     recording, truth = folder / f"{rig}.parquet", folder / f"{rig}_truth.parquet"
     words = ["simulate", str(EXAMPLES / "rigs" / f"{rig}.json"), "-o", str(recording), "--truth", str(truth)]
-    subprocess.run([sys.executable, "-m", "tendonfmu.cli", *words], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run([sys.executable, "-m", "tendonfmu", *words], check=True, stdout=subprocess.DEVNULL)
     return recording, read_recording(recording), pd.read_parquet(truth)
 
 

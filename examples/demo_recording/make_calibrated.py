@@ -50,7 +50,7 @@ def free_motion(folder: Path) -> list[Path]:
 
 def calibrate(folder: Path, jobs: int) -> Path:
     """The calibrated description in a folder, of `tendonfmu calibrate`: a call that is repeated goes on."""
-    command = [sys.executable, "-m", "tendonfmu.cli", "calibrate", str(GIVEN), *map(str, free_motion(folder))]
+    command = [sys.executable, "-m", "tendonfmu", "calibrate", str(GIVEN), *map(str, free_motion(folder))]
     pushes = ["--pushes", str(HERE / "index_finger_pushes.parquet")]
     output = folder / "calibrated"
     subprocess.run([*command, *pushes, "-o", str(output), "--jobs", str(jobs), "--progress"], check=True)

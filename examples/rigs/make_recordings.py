@@ -24,7 +24,7 @@ def main() -> int:
     parser.add_argument("-o", "--output", type=Path, default=HERE.parent / "demo_recording", help="folder")
     folder = parser.parse_args().output
     for rig, recording in RECORDINGS.items():
-        command = [sys.executable, "-m", "tendonfmu.cli", "simulate", str(HERE / rig), "-o", str(folder / recording)]
+        command = [sys.executable, "-m", "tendonfmu", "simulate", str(HERE / rig), "-o", str(folder / recording)]
         status = subprocess.run(command, check=False).returncode
         if status:
             return status

@@ -1,5 +1,5 @@
 """Run `python -m tendonfmu` as the command `tendonfmu`."""
 
-from tendonfmu.cli import main
+from tendonfmu.commands.program import main
 
 main()

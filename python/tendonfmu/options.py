@@ -1,7 +1,7 @@
 """The options of the commands: name, default, values and a line of help of each, once.
 
-`tendonfmu.cli` makes the command line of a command from its class, and the functions of Python check their options with
-it. Both pass the object on. An option means the same in every command.
+`commands.command` makes the command line of a command from its class; `keywords` gives them to its function in Python,
+with signature and docstring. An option means the same in every command.
 """
 
 # ruff: noqa: RUF009 (`option` makes a field)
@@ -9,22 +9,34 @@ it. Both pass the object on. An option means the same in every command.
 
 from __future__ import annotations
 
+import functools
+import inspect
 import math
 import operator
 import os
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from enum import IntEnum
 from numbers import Integral, Real
 from pathlib import Path
 from reprlib import Repr
-from typing import Any, ClassVar, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Concatenate, ParamSpec, TypeAlias, TypeVar
 
 from tendonfmu.errors import InputError
 
+if TYPE_CHECKING:
+    from tendonfmu.recordings import RecordingSource
+    from tendonfmu.tasks import PhaseState
+
+RecordingSources: TypeAlias = "RecordingSource | Sequence[RecordingSource]"
 _SHORT = Repr()
 _SHORT.maxstring = _SHORT.maxother = 60
 
+First = TypeVar("First")
+Second = TypeVar("Second")
+Result = TypeVar("Result")
+Keywords = ParamSpec("Keywords")
 Taken = TypeVar("Taken", bound="Options")
 Made = TypeVar("Made", bound="Configured")
 
@@ -91,11 +103,12 @@ class Choice:
 
 @dataclass(eq=False, repr=False)
 class Kind:
-    """A value of one of `types`; the first is the type on the command line."""
+    """A value of one of `types`; the first is that on the command line. Without `checked` whoever uses it checks."""
 
     words: str
     types: tuple[Any, ...]
     optional: bool = False
+    checked: bool = True
 
     def __str__(self) -> str:
         return self.words + (" or None" if self.optional else "")
@@ -109,7 +122,7 @@ class Kind:
         """Return the value. Raises ValueError if it has another type."""
         if bool in self.types and type(value).__name__ in ("bool", "bool_"):  # of numpy, which takes 0.1 s to import
             return bool(value)
-        if not (isinstance(value, self.types) or (value is None and self.optional)):
+        if self.checked and not (isinstance(value, self.types) or (value is None and self.optional)):
             raise ValueError
         return value
 
@@ -129,8 +142,10 @@ class Several:
         """Type on the command line."""
         return list[self.item.type] | None  # type: ignore[name-defined]
 
-    def read(self, value: Any) -> list[Any]:
-        """Return a list. Raises ValueError if there is anything else in it."""
+    def read(self, value: Any) -> Any:
+        """Return a list, or what is not checked as it is. Raises ValueError if there is anything else in the list."""
+        if isinstance(self.item, Kind) and not self.item.checked:
+            return value
         alone = isinstance(value, str | os.PathLike) or not isinstance(value, Iterable)
         items = [self.item.read(item) for item in ([value] if alone else value)]
         # scikit-learn's clone wants back the very list that it passed
@@ -143,6 +158,9 @@ _COLUMN = Kind("the name of a column", (str,), optional=True)
 _PATH = Kind("a path", (Path, str, os.PathLike), optional=True)
 _TEXTS = Several("a text or a list of texts", Kind("a text", (str,)))
 _PATHS = Several("a path or a list of paths", Kind("a path", (Path, str, os.PathLike)))
+_RECORDING = Kind("a recording, DataFrame or file", (Path,), optional=True, checked=False)
+_RECORDINGS = Several("a recording, DataFrame or file, or a list of them", Kind("", (Path,), checked=False))
+_FUNCTION = Kind("a function", (Callable,), optional=True)
 _YES, _YES_OR_NONE = Kind("True or False", (bool,)), Kind("True, False", (bool,), optional=True)
 
 
@@ -157,14 +175,21 @@ class Option:
     help: str | None = None
     metavar: str | None = None
     names: tuple[str, ...] = ()  # on the command line, where that of the field is not enough
+    shown: bool = True  # on the command line
+
+    def sentence(self, default: Any) -> str:
+        """Describe the option for readers of Python: what it is, its values and its default."""
+        words = re.sub(r"; may be repeated| \[default: .*\]", "", self.help or "")
+        usual = re.findall(r"\[default: (.*)\]", self.help or "") or [repr(default)]
+        return f"{words[:1].upper()}{words[1:]} ({self.values}; default {usual[0]})."
 
 
-def option(default: Any, values: Number | Choice | Kind | Several, help: str | None = None, **shown: Any) -> Any:
-    """Make the field of an option."""
-    return field(default=default, metadata={"option": Option(values, help, **shown)})
+def option(default: Any, values: Number | Choice | Kind | Several, help: str = "", **shown: Any) -> Any:
+    """Make the field of an option, which is given by its name."""
+    return field(default=default, metadata={"option": Option(values, help or None, **shown)})
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Options:
     """Base of the options of a command. Raises InputError that names an option whose value is refused."""
 
@@ -185,13 +210,40 @@ class Options:
         """Return the defaults by name."""
         return {each.name: each.default for each in fields(cls)}
 
-    @classmethod
-    def of(cls: type[Taken], arguments: Mapping[str, Any]) -> Taken:
-        """Take the options out of the arguments of a function, and check its `progress`."""
-        progress = arguments.get("progress")
-        if not (progress is None or callable(progress)):
-            raise InputError(f"progress: {_SHORT.repr(progress)}; expected a function or None")
-        return cls(**{name: arguments[name] for name in cls.each() if name in arguments})
+    def files(self, *names: str) -> list[Path]:
+        """Return the files that the command line gave for some options."""
+        given = [getattr(self, name) for name in names]
+        return [file for one in given for file in (one if isinstance(one, list) else [one] if one else [])]
+
+    def without(self, *names: str) -> dict[str, Any]:
+        """Return the options but some by name."""
+        return {name: value for name, value in vars(self).items() if name not in names}
+
+
+def keywords(
+    options: Callable[Keywords, Taken],
+) -> Callable[[Callable[[First, Second, Taken], Result]], Callable[Concatenate[First, Second, Keywords], Result]]:
+    """Decorate a function of two arguments and options: it takes each option by name, and its docstring lists them."""
+    known: Any = options
+
+    def decorate(function: Callable[..., Result]) -> Callable[Concatenate[First, Second, Keywords], Result]:
+        *sources, _ = inspect.signature(function).parameters.values()
+        listed, ours = "", []
+        for each in fields(known):
+            by_name = inspect.Parameter.KEYWORD_ONLY
+            ours.append(inspect.Parameter(each.name, by_name, default=each.default, annotation=each.type))
+            listed += f"    {each.name}\n        {each.metadata['option'].sentence(each.default)}\n"
+
+        @functools.wraps(function)
+        def call(*given: Any, **named: Any) -> Result:
+            by_name = {each.name: named.pop(each.name) for each in sources[len(given) :] if each.name in named}
+            return function(*given, **by_name, options=known(**named))
+
+        call.__signature__ = inspect.Signature([*sources, *ours])  # type: ignore[attr-defined]
+        call.__doc__ = (function.__doc__ or "").replace("\n    Returns\n", f"{listed}\n    Returns\n", 1)
+        return call
+
+    return decorate
 
 
 def checked(name: str, value: Any, values: Number | Choice | Kind | Several) -> Any:
@@ -203,17 +255,16 @@ def checked(name: str, value: Any, values: Number | Choice | Kind | Several) -> 
 
 
 class Configured:
-    """Base of an estimator as in scikit-learn, which keeps its finger, its options and the function of its progress."""
+    """Base of an estimator as in scikit-learn, which keeps its finger and its options."""
 
     Options: ClassVar[type[Options]]
     EARLIER: ClassVar[Mapping[str, str]] = {}  # names of earlier versions -> options
 
-    def __init__(self, finger: Any, *, progress: Callable[..., Any] | None = None, **options: Any) -> None:
+    def __init__(self, finger: Any, **options: Any) -> None:
         unknown = set(options) - set(self.Options.each())
         if unknown:
             raise TypeError(f"{type(self).__name__}: unexpected options {', '.join(sorted(unknown))}")
-        self.finger, self.progress = finger, progress
-        self.options = self.Options(**options)
+        self.finger, self.options = finger, self.Options(**options)
 
     def __getattr__(self, name: str) -> Any:
         """Return an option, as scikit-learn's estimators have them."""
@@ -225,7 +276,7 @@ class Configured:
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:
         """Return the constructor arguments by name."""
-        return {"finger": self.finger, **vars(self.options), "progress": self.progress}
+        return {"finger": self.finger, **vars(self.options)}
 
     def set_params(self: Made, **params: Any) -> Made:
         """Set constructor arguments by name and return the object itself."""
@@ -237,7 +288,7 @@ class Configured:
         return self
 
     def __repr__(self) -> str:
-        usual = {**vars(self.Options()), "progress": None}
+        usual = vars(self.Options())
         given = {name: value for name, value in self.get_params().items() if name not in usual or value != usual[name]}
         return f"{type(self).__name__}({', '.join(f'{name}={value!r}' for name, value in given.items())})"
 
@@ -262,17 +313,31 @@ def _false_alarms() -> Any:
     return option(6.0, Number(1e-3, 3600.0), "false alarms an hour in other free motion, at most", metavar="RATE")
 
 
+def _path(help: str, **shown: Any) -> Any:
+    return option(None, _PATH, help, **shown)
+
+
+def _recordings(help: str, metavar: str = "RECORDING", default: Any = ()) -> Any:
+    words, bracket, usual = help.partition(" [")
+    return option(default, _RECORDINGS, f"{words}; may be repeated{bracket}{usual}", metavar=metavar)
+
+
+def _progress(help: str) -> Any:
+    return option(None, _FUNCTION, help, shown=False)
+
+
 # --- the commands -----------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class BuildOptions(Options):
     """Options of `build`."""
 
-    ssv: Sequence[File] = option((), _PATHS, "parameter set that the FMU carries; may be repeated", metavar="SET.ssv")
-    binaries: File | None = option(
-        None, _PATH, "folder of binaries by FMI platform [default: those installed]", metavar="DIR"
+    reference: RecordingSource | None = option(
+        None, _RECORDING, "recording; the FMU carries its inputs and outputs for checks", metavar="REC"
     )
+    ssv: Sequence[File] = option((), _PATHS, "parameter set that the FMU carries; may be repeated", metavar="SET.ssv")
+    binaries: File | None = _path("folder of binaries by FMI platform [default: those installed]", metavar="DIR")
     fmi: int = option(2, Number(2, 3, whole=True), "version of FMI; 3: forces and torques as arrays", metavar="2|3")
     sample_at: str = option(
         "begin",
@@ -285,14 +350,15 @@ class BuildOptions(Options):
     )
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class RunOptions(Options):
     """Options of `run`."""
 
     kinematics: int = _kinematics()
+    progress: Callable[[int], None] | None = _progress("called with the number of samples done")
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class ExciteOptions(Options):
     """Options of `excite`."""
 
@@ -326,7 +392,7 @@ class ExciteOptions(Options):
     seed: int = _seed()
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class FitOptions(Options):
     """Options of `fit`."""
 
@@ -355,8 +421,8 @@ class FitOptions(Options):
     scale: Sequence[str] = option(
         (), _TEXTS, "expected magnitude, instead of the description's", metavar="PATTERN=VALUE"
     )
-    previous: File | None = option(
-        None, _PATH, "report or description of an earlier fit, as the prior", metavar="PREVIOUS.json", names=("--from",)
+    previous: File | None = _path(
+        "report or description of an earlier fit, as the prior", metavar="PREVIOUS.json", names=("--from",)
     )
     effective_samples: bool = option(
         True,
@@ -369,7 +435,8 @@ class FitOptions(Options):
     )
     tolerance: float = option(0.3, Number(1e-9, 0.5), "batch: last step, in standard errors", metavar="SIZE")
     drift: float = option(0.0, Number(0.0, 1.0), "ekf: relative variance of the numbers per s", metavar="RATE")
-    resume: File | None = option(None, _PATH, "continue an interrupted fit", metavar="FITTED.unfinished.json")
+    resume: File | None = _path("continue an interrupted fit", metavar="FITTED.unfinished.json")
+    progress: Callable[[Any], bool | None] | None = _progress("called with each `FitProgress`; returns False to stop")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -379,29 +446,50 @@ class FitOptions(Options):
             )
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class FitArguments(FitOptions):
+    """What `fit` takes beside finger and recordings."""
+
+    compare: RecordingSources = _recordings("recording to judge, not to fit")
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class CalibrateOptions(Options):
     """Options of `calibrate`."""
 
+    test: RecordingSources = _recordings("free motion that only judges the result [default: parts of FREE]", "FREE")
+    pushes: RecordingSources = _recordings("recordings with labelled contact, to count what is found", "LABELLED")
+    previous: File | None = _path(
+        "finger.json of an earlier calibration, or report of a fit, as the prior; for little data",
+        metavar="PREVIOUS.json",
+        names=("--from",),
+    )
+    folder: File | None = _path("folder for the results of the steps: a repeated call goes on there", shown=False)
     false_alarms_per_hour: float = _false_alarms()
     kinematics: int = _kinematics()
     seed: int = _seed()
     jobs: int = _jobs()
+    progress: Callable[[PhaseState], None] | None = _progress("called with each `PhaseState`")
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class DiagnoseOptions(Options):
     """Options of `diagnose`."""
 
+    test: RecordingSources = _recordings("recordings to measure the gain on, not to fit [default: parts of RECORDING]")
+    reference: RecordingSources | None = _recordings(
+        "recordings of the same finger when healthy, to find what has changed since; best the same motion", default=None
+    )
     kinematics: int = _kinematics()
     least_gain: float = option(
         0.03, Number(0.0, 0.5), "least drop of the rms on unseen data for a cause", metavar="SHARE"
     )
     seed: int = _seed()
     jobs: int = _jobs()
+    progress: Callable[[PhaseState], None] | None = _progress("called with each `PhaseState`")
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class TuneOptions(Options):
     """Options of `tune`."""
 
@@ -413,9 +501,10 @@ class TuneOptions(Options):
         None, Number(1e-3, 1e4, optional=True), "time constant of the bias [default: unchanged]", metavar="SECONDS"
     )
     kinematics: int = _kinematics()
+    progress: Callable[[int, int], None] | None = _progress("called with steps done and steps")
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class ScoreOptions(Options):
     """Options of `score`."""
 
@@ -423,3 +512,4 @@ class ScoreOptions(Options):
     force: str | None = option(None, _COLUMN, "sensed force in N, reported at each alarm and drawn", metavar="COLUMN")
     kinematics: int = _kinematics()
     seed: int = _seed()
+    progress: Callable[[int, int], None] | None = _progress("called with runs done and runs")

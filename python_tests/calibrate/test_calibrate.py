@@ -17,10 +17,10 @@ from tendonfmu.calibration import calibration
 from tendonfmu.calibration.calibration import Calibration, Options, calibrate
 from tendonfmu.calibration.fit import DIAGNOSED, JUDGED, fit_all, stretches_for_diagnosis
 from tendonfmu.calibration.text import verdict, write_calibration
+from tendonfmu.commands.calibrate import CalibrateResult
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.structure import described
 from tendonfmu.files.tables import write_table
-from tendonfmu.interface.calibrating import CalibrateResult
 from tendonfmu.model.description import read_finger
 from tendonfmu.recordings.prepared import Held, prepare
 from tendonfmu.recordings.recording import Recording, at_rows, read_recording

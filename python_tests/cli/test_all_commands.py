@@ -23,7 +23,7 @@ from fmu_binary import FINGER
 from plant_fmu_rig import fmu_rig
 from repetitions import repeated
 from repository_paths import ROOT
-from tendonfmu.cli.program import app
+from tendonfmu.commands.program import app
 
 GROUP: Any = typer.main.get_command(app)
 COMMANDS = dict(GROUP.commands)
@@ -32,8 +32,8 @@ EXAMPLES = ROOT / "examples"
 # Enough of each command that it starts, and what it calls first of the package, so that a test can make it fail.
 CALLS = {
     "check": ("{finger}", "tendonfmu.model.read_finger"),
-    "build": ("{finger} -o out.fmu", "tendonfmu.interface.build"),
-    "run": ("{finger} {recording} -o out.csv", "tendonfmu.interface.run"),
+    "build": ("{finger} -o out.fmu", "tendonfmu.commands.build.build"),
+    "run": ("{finger} {recording} -o out.csv", "tendonfmu.commands.run.run"),
     "simulate": ("{rig} -o out.csv", "tendonfmu.simulate.simulate"),
     "convert": ("emps {recording} -o out.csv", "tendonfmu.recordings.convert_file"),
     "import": ("mjcf {model} --joints hinge -o imported.json", "tendonfmu.mjcf.import_finger"),
@@ -43,12 +43,12 @@ CALLS = {
         "tendonfmu.recordings.describe_recorded_joint",
     ),
     "excite": ("{finger} -o motion.csv --duration 20", "tendonfmu.excite.training_motion.excite"),
-    "fit": ("{finger} {recording} -o fitted.json", "tendonfmu.interface.fit"),
+    "fit": ("{finger} {recording} -o fitted.json", "tendonfmu.commands.fit.fit"),
     "calibrate": ("{finger} {recording} -o calibration", "tendonfmu.calibration.calibrate"),
-    "diagnose": ("{finger} {recording} -o diagnosis", "tendonfmu.interface.diagnose"),
-    "tune": ("{finger} {recording} -o tuned.json", "tendonfmu.interface.tune"),
-    "score": ("{finger} {recording} -o score.json", "tendonfmu.interface.score"),
-    "demo": ("-o demo", "tendonfmu.demo.Story"),
+    "diagnose": ("{finger} {recording} -o diagnosis", "tendonfmu.commands.diagnose.diagnose"),
+    "tune": ("{finger} {recording} -o tuned.json", "tendonfmu.commands.tune.tune"),
+    "score": ("{finger} {recording} -o score.json", "tendonfmu.commands.score.score"),
+    "demo": ("-o demo", "tendonfmu.commands.demo.Story"),
 }
 LEARNING = ("fit", "calibrate", "diagnose", "tune")  # what takes seconds
 QUICK = ("check", "build", "run", "simulate", "excite")  # the others are seen with --json where they are tested
@@ -308,7 +308,7 @@ def test_tables_go_to_standard_output_and_nothing_else_does(call: Call, case: Pa
 
 def test_a_reader_that_leaves_ends_nothing(case: Path) -> None:
     """As in `tendonfmu run ... -o - | head -1`: no message, and done."""
-    command = [sys.executable, "-m", "tendonfmu.cli", "simulate", "rig.json", "-o", "-", "-q"]
+    command = [sys.executable, "-m", "tendonfmu", "simulate", "rig.json", "-o", "-", "-q"]
     pipe = subprocess.PIPE
     with subprocess.Popen(command, stdout=pipe, stderr=pipe, cwd=case) as process:
         assert process.stdout is not None and process.stderr is not None
@@ -325,7 +325,7 @@ START = """
 import contextlib, io, json, sys
 import tendonfmu
 before = sorted(sys.modules)
-from tendonfmu.cli import program
+from tendonfmu.commands import program
 with contextlib.redirect_stdout(io.StringIO()):
     for name in sys.argv[1:]:
         with contextlib.suppress(SystemExit):

@@ -19,7 +19,7 @@ import tendonfmu
 from command import Call
 from fmu_binary import FINGER
 from repository_paths import ROOT
-from tendonfmu.cli.console import reader_may_leave
+from tendonfmu.commands.console import reader_may_leave
 from tendonfmu.errors import InputError, InternalError, OutputError, line_of, own_fault
 from tendonfmu.fault_report import write_fault_report
 from tendonfmu.files.writing import whole_file
@@ -94,7 +94,7 @@ def test_under_a_limit_a_lack_of_memory_is_one_line(tmp_path: Path, megabytes: i
     demo = ROOT / "examples" / "demo_recording"
     given = (demo / "two_joints.json", demo / "two_joints_training.parquet")
     limit = f"import resource; resource.setrlimit(resource.RLIMIT_AS, ({megabytes} << 20, -1)); "
-    script = f"{limit}import tendonfmu.cli; tendonfmu.cli.main()"
+    script = f"{limit}from tendonfmu.commands.program import main; main()"
     ended = subprocess.run(
         [sys.executable, "-c", script, "run", *given, "-o", tmp_path / "out.csv"],
         env={name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")},

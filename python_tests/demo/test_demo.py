@@ -14,7 +14,7 @@ import pytest
 from command import DemoRun
 from real_browser import Elements, needs_nothing_else
 from repository_paths import ROOT
-from tendonfmu.demo import demo
+from tendonfmu.commands import demo
 
 HIDDEN = ROOT / "examples" / "demo_recording" / "two_joints_hidden.json"
 LARGEST = 4_000_000  # bytes of the page
@@ -82,7 +82,7 @@ def test_the_page_is_self_contained(demo_run: DemoRun) -> None:
 
 
 def test_chapters_that_cannot_be_are_left_out_loudly(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(demo, "HAS_ESTIMATION", False)
+    monkeypatch.setattr("tendonfmu.estimate.HAS_ESTIMATION", False)
     story = demo.Story(tmp_path / "out")
     assert "calibrate, diagnose, fit are left out: " in story.missing and "Eigen" in story.missing
     assert story.names == ["detect", "run"]

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-import tendonfmu.cli
+import tendonfmu
 from command import Call, run_script
 from repository_paths import ROOT
 from tendonfmu.detect.free_motion import FreePart, free_parts
@@ -242,7 +242,7 @@ def tuned(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder in which the demo's free motion was tuned."""
     folder = tmp_path_factory.mktemp("tuned")
     names = ["-o", folder / "t.json", "--report", folder / "r.json", "--figures", folder / "fig"]
-    main = Path(tendonfmu.cli.__file__).with_name("__main__.py")
+    main = Path(tendonfmu.__file__).with_name("__main__.py")
     answer = run_script(main, "tune", INDEX, FREE, FREE_X4, *names, "--false-alarms-per-hour", str(WISHED))
     assert answer.status == 0, answer.err
     return folder

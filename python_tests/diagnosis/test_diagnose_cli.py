@@ -15,7 +15,7 @@ import pytest
 
 import diagnosis_examples as examples
 from command import Call
-from tendonfmu.cli.command import several_values
+from tendonfmu.commands.command import several_values
 from tendonfmu.diagnosis.result import Diagnosis
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.files import check_unseen
@@ -41,7 +41,7 @@ def answering(monkeypatch: pytest.MonkeyPatch) -> Callable[[Diagnosis], Called]:
             asked.append((finger.name, [each.name for each in recordings], [each.name for each in tests], options))
             return found
 
-        monkeypatch.setattr("tendonfmu.interface.diagnosing.find", answer)
+        monkeypatch.setattr("tendonfmu.diagnosis.diagnose", answer)
         return asked
 
     return put

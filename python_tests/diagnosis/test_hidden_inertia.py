@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tendonfmu.interface import diagnose
+from tendonfmu.commands.diagnose import diagnose
 from tendonfmu.recordings.recording import Recording
 
 Array = NDArray[np.float64]

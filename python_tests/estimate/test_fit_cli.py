@@ -134,7 +134,7 @@ def test_ctrl_c_leaves_the_best_so_far_and_resume_goes_on(
     examples = ROOT / "examples"
     given = (examples / "fingers" / "index_finger.json", examples / "demo_recording" / "index_finger_free.parquet")
     command = ["fit", *map(str, given), "-o", "fitted.json", "--method", method]
-    main = "from tendonfmu.cli import main; main()"
+    main = "from tendonfmu.commands.program import main; main()"
     pipe = subprocess.PIPE
     run = subprocess.Popen(
         [sys.executable, "-c", main, *command, "--progress"],

@@ -17,8 +17,8 @@ import servo
 from command import Call
 from map_cases import TURNING, edited
 from optional_parts import DATA, needs
+from tendonfmu.commands.diagnose import diagnose
 from tendonfmu.estimate.fitting import FrictionFit
-from tendonfmu.interface.diagnosing import diagnose
 from tendonfmu.recordings import convert_table, describe_joint, joint_description
 from tendonfmu.recordings.prepared import left_at_rest
 

@@ -192,7 +192,7 @@ ALONE = """
 import sys, time
 events = ("subprocess.Popen", "os.system", "os.exec", "os.posix_spawn", "os.fork")
 sys.addaudithook(lambda event, of: sys.exit(event) if event in events else None)
-from tendonfmu.cli import main
+from tendonfmu.commands.program import main
 try:
     main()
 except SystemExit as ended:

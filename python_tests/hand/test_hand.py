@@ -13,8 +13,9 @@ import pytest
 
 from command import Call
 from small_hand import FINGERS, write_worn_hand, write_wrist_hand
+from tendonfmu.commands.command import is_hand
+from tendonfmu.commands.hand.description import read_hand, with_descriptions
 from tendonfmu.errors import InputError
-from tendonfmu.hand.description import is_hand, read_hand, with_descriptions
 from tendonfmu.model.description import read_finger
 
 SCHEMA = json.loads((files("tendonfmu") / "schema" / "hand.schema.json").read_text(encoding="utf-8"))

@@ -15,12 +15,14 @@ import tendonfmu as tf
 from command import Call
 from real_browser import Elements
 from small_hand import FINGERS, worn_columns, write_worn_hand
-from tendonfmu.hand import parts
-from tendonfmu.hand.page import PAGE, write_hand_page
-from tendonfmu.hand.parts import PartResult, split_files
-from tendonfmu.hand.report import (
+from tendonfmu import diagnosis
+from tendonfmu.commands.hand.outcome import split_files
+from tendonfmu.commands.hand.page import (
     CALIBRATION,
+    PAGE,
+    PartResult,
     calibration_rows,
+    write_hand_page,
 )
 
 
@@ -132,7 +134,7 @@ def test_an_internal_error_of_one_finger_is_its_row(
     tmp_path: Path, call: Call, monkeypatch: pytest.MonkeyPatch, kind: tuple[str, ...]
 ) -> None:
     name = "diagnose_history" if kind else "diagnose"
-    real, broken = getattr(parts, name), {"index"}
+    real, broken = getattr(diagnosis, name), {"index"}
 
     def breaks(finger: Any, *given: Any, **options: Any) -> Any:
         stem = finger.path.stem if kind else Path(finger).stem
@@ -140,7 +142,7 @@ def test_an_internal_error_of_one_finger_is_its_row(
             raise KeyError(f"no {stem}")
         return real(finger, *given, **options)
 
-    monkeypatch.setattr(parts, name, breaks)
+    monkeypatch.setattr(diagnosis, name, breaks)
     files = write_worn_hand(tmp_path, then=worn_columns(1, seconds=20.0), later=worn_columns(2, "ring", seconds=20.0))
     command = ("diagnose", files["hand"], files["later"], "--reference", files["then"], "-o", "out", *kind)
     answer = call(*command, "--kinematics", "3", "--json")

@@ -16,7 +16,7 @@ import diagnosis_examples as examples
 import tendonfmu as tf
 from command import Call
 from repository_paths import ROOT
-from tendonfmu.interface import Diagnosis, diagnosing
+from tendonfmu.commands.diagnose import Diagnosis
 
 DEMO = ROOT / "examples/demo_recording"
 FINGER, INDEX = DEMO / "two_joints.json", DEMO / "index_finger_calibrated.json"
@@ -164,7 +164,7 @@ def test_a_command_says_once_which_columns_it_ignores(frame: pd.DataFrame, tmp_p
 def test_warnings_name_the_line_of_the_caller(monkeypatch: pytest.MonkeyPatch) -> None:
     """And are in the result, escaped where it is shown."""
     made = replace(examples.adequate(), warnings=("too little <motion>",))
-    monkeypatch.setattr(diagnosing, "find", lambda *_, **__: made)
+    monkeypatch.setattr("tendonfmu.diagnosis.diagnose", lambda *_, **__: made)
     unlabelled = pd.read_parquet(PUSHES).drop(columns="contact").iloc[:4000]
     for category, compute in (
         (tf.FitWarning, lambda: tf.fit(FINGER, TRAINING, only="joints[1].friction.coulomb", passes=2)),

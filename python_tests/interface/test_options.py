@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import math
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -21,28 +22,38 @@ FINGER, RECORDING = DEMO / "two_joints.json", DEMO / "two_joints_training.parque
 FUNCTIONS: list[tuple[Callable[..., Any], type[options.Options]]] = [
     (tf.build, options.BuildOptions),
     (tf.run, options.RunOptions),
-    (tf.fit, options.FitOptions),
+    (tf.fit, options.FitArguments),
     (tf.tune, options.TuneOptions),
     (tf.score, options.ScoreOptions),
     (tf.diagnose, options.DiagnoseOptions),
     (tf.calibrate, options.CalibrateOptions),
 ]
-OTHERS = {"compare", "folder", "progress", "pushes", "reference", "test"}  # recordings, a folder and a function
 
 
 @pytest.mark.parametrize(("function", "of_command"), FUNCTIONS)
 def test_a_function_has_the_options_of_its_command(
     function: Callable[..., Any], of_command: type[options.Options]
 ) -> None:
-    """Its signature is written out for editors and type checkers; the command line is made from the class."""
+    """In its signature, and in its docstring with their values and defaults: both are made from the class."""
     signature = {
         name: parameter.default
         for name, parameter in inspect.signature(function).parameters.items()
-        if parameter.kind is inspect.Parameter.KEYWORD_ONLY and name not in OTHERS
+        if parameter.kind is inspect.Parameter.KEYWORD_ONLY
     }
-    if function is tf.calibrate:  # a parameter of the command, not an option of the class
-        assert signature.pop("previous") is None
     assert signature == of_command.defaults()
+    listed = (
+        inspect.cleandoc(function.__doc__ or "").partition("Parameters\n----------\n")[2].partition("\n\nReturns")[0]
+    )
+    assert re.findall(r"^\w+$", listed, re.MULTILINE)[2:] == list(signature)
+    for name, option in of_command.each().items():
+        assert re.search(
+            rf"^{name}\n    [A-Z1].* \({re.escape(str(option.values))}; default .*\)\.$", listed, re.MULTILINE
+        )
+
+
+def test_its_sources_are_given_by_name_as_well() -> None:
+    given = {"recording": RECORDING, "kinematics": 1, "finger": FINGER}
+    assert tf.run(**given).frame.equals(tf.run(FINGER, RECORDING).frame)  # type: ignore[call-arg]
 
 
 @pytest.mark.parametrize(

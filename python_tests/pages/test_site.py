@@ -11,7 +11,7 @@ import typer
 
 from optional_parts import require
 from repository_paths import ROOT
-from tendonfmu.cli.program import app
+from tendonfmu.commands.program import app
 from tendonfmu.diagnosis.effects.table import CANDIDATES
 
 SOURCES = re.compile(r"^(runtime|fmu_src|python)/.*\.(c|h|cpp|hpp|py|json)$")

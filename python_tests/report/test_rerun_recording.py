@@ -100,4 +100,4 @@ def test_without_the_package_it_names_what_to_install(
 def test_a_hand_is_refused(call: Call, files: tuple[str, str], tmp_path: Path) -> None:
     (tmp_path / "hand.json").write_text(json.dumps({"format": "tendonfmu-hand-1"}))
     answer = call("run", "hand.json", files[1], "-o", "out.csv", "--rerun", "out.rrd")
-    assert answer.status == 2 and "hand.json: a hand; --rerun shows one finger" in answer.err
+    assert answer.status == 2 and "hand.json: a hand, given with --rerun; expected a finger" in answer.err

@@ -319,7 +319,7 @@ def test_an_installation_without_the_module_does_everything_else(tmp_path: Path)
     shutil.copytree(installed, tmp_path / "tendonfmu", ignore=without)
 
     def run(*arguments: str | Path) -> tuple[int, str, str]:
-        command = [sys.executable, "-m", "tendonfmu.cli", *map(str, arguments)]
+        command = [sys.executable, "-m", "tendonfmu", *map(str, arguments)]
         done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
         return done.returncode, done.stdout, done.stderr
 

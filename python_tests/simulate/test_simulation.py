@@ -125,7 +125,7 @@ def test_the_processor_shows_within_the_tolerance_only(tolerance: float, tmp_pat
     multiply-add."""
     rig = short_rig(integration={"relative_tolerance": tolerance})
     for name, environment in {"with": {}, "without": {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4"}}.items():
-        command = [sys.executable, "-m", "tendonfmu.cli", "simulate", str(written(tmp_path, rig))]
+        command = [sys.executable, "-m", "tendonfmu", "simulate", str(written(tmp_path, rig))]
         files = ["-o", f"{name}.parquet", "--truth", f"{name}_truth.parquet"]
         subprocess.run(
             [*command, *files],
@@ -169,7 +169,7 @@ def test_the_binding_tells_solver_failures_from_bad_calls(tmp_path: Path) -> Non
 def test_ctrl_c_ends_a_long_simulation_at_once(tmp_path: Path) -> None:
     data = short_rig(recording={"duration": 20000.0})
     data["motion"]["duration"] = 20000.0
-    command = [sys.executable, "-m", "tendonfmu.cli", "simulate", str(written(tmp_path, data)), "-o", "rec.csv"]
+    command = [sys.executable, "-m", "tendonfmu", "simulate", str(written(tmp_path, data)), "-o", "rec.csv"]
 
     def take_interrupts() -> None:
         """A job in the background of a shell inherits that SIGINT is ignored."""

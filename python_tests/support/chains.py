@@ -18,7 +18,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-import tendonfmu.cli
+import tendonfmu
 from command import Answer, run_script
 from fit_cases import lasting_finger
 from fit_data import recorded
@@ -34,7 +34,7 @@ KINEMATICS = (1, 2, 3)
 
 def call(*arguments: str | Path) -> Answer:
     """`tendonfmu ARGUMENTS` in the present folder."""
-    return run_script(Path(tendonfmu.cli.__file__).with_name("__main__.py"), *arguments)
+    return run_script(Path(tendonfmu.__file__).with_name("__main__.py"), *arguments)
 
 
 @contextmanager

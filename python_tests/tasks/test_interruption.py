@@ -44,7 +44,7 @@ def brief(): return replace(examples.one_cause(), views=examples.one_cause().vie
 {body}
 diagnosis.diagnose = compute
 sys.argv = ["tendonfmu", "diagnose", "finger.json", "a.csv", "-o", "out"]
-from tendonfmu.cli import main
+from tendonfmu.commands.program import main
 main()
 """
 

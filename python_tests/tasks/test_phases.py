@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tendonfmu.cli.console import MOST_WARNINGS, PRINTED, Bar, print_results
+from tendonfmu.commands.console import MOST_WARNINGS, PRINTED, Bar, print_results
 from tendonfmu.tasks.phases import Phases, PhaseState
 
 SHARES = {"reading": 1.0, "fitting": 6.0, "judging": 3.0}

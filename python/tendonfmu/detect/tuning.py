@@ -249,7 +249,7 @@ class ContactTuning(Configured):
         self.seconds_ = perf_counter() - begin
         self._judge()
         for sentence in self.warnings_:
-            warnings.warn(sentence, TuneWarning, stacklevel=3)  # at the call of tendonfmu.tune
+            warnings.warn(sentence, TuneWarning, stacklevel=4)  # at the call of tendonfmu.tune
         return self
 
     def _parts(self, sources: Sequence[RecordingSource], checked: bool) -> list[FreePart]:

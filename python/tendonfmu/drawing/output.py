@@ -18,30 +18,17 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from tendonfmu.arrays import Numbers
-from tendonfmu.drawing.figures import (
-    BLUE,
-    COLOURS,
-    DARK,
-    GREEN,
-    GREY,
-    SILVER,
-    VERMILION,
-    Interval,
-    Panel,
-    Sheet,
-    curve,
-    panel,
-    stripes,
-)
+from tendonfmu.drawing import figures as fig
+from tendonfmu.drawing.figures import panel
 
 # Replacements on a dark page. The other colours are visible on both.
 IN_DARK = {
-    DARK: "#E4E8EC",
-    BLUE: "#6E95FF",
-    GREY: "#A4ABB3",
-    VERMILION: "#F0803C",
-    GREEN: "#2FC79B",
-    SILVER: "#7C858E",
+    fig.DARK: "#E4E8EC",
+    fig.BLUE: "#6E95FF",
+    fig.GREY: "#A4ABB3",
+    fig.VERMILION: "#F0803C",
+    fig.GREEN: "#2FC79B",
+    fig.SILVER: "#7C858E",
     "#5A5A5A": "#B9BFC6",
     "#332288": "#A495F5",
     "#999933": "#C4C45A",
@@ -76,7 +63,7 @@ _COLUMNS, _ROW, _GAP = 2, 230, 84  # of a notebook's figure; heights in CSS pixe
 # --- in a page --------------------------------------------------------------------------------------------------------
 
 
-def figures_json(panels: Iterable[Panel]) -> Markup:
+def figures_json(panels: Iterable[fig.Panel]) -> Markup:
     """Return the figures of a page as JSON that is safe inside a `script` element."""
     figures = [
         {"data": panel.traces, "layout": panel.layout, "height": panel.extent[1], "zoom": panel.zoom}
@@ -115,7 +102,7 @@ def dark_colours() -> Markup:
 # --- in a notebook ----------------------------------------------------------------------------------------------------
 
 
-def sheets_figure(title: str, sheets: Sequence[Sheet]) -> Any:
+def sheets_figure(title: str, sheets: Sequence[fig.Sheet]) -> Any:
     """Draw the panels of sheets, two in a row."""
     headings = [(sheet.title if k == 0 else "", panel) for sheet in sheets for k, panel in enumerate(sheet.panels)]
     panels = [panel for _, panel in headings]
@@ -128,18 +115,18 @@ def series_figure(
     x_label: str,
     x: Numbers,  # [N]
     rows: Mapping[str, Mapping[str, Numbers]],  # label with its unit in brackets -> name -> y [N]
-    shaded: Mapping[tuple[str, str], Sequence[Interval]],  # (name, colour) -> intervals of x
+    shaded: Mapping[tuple[str, str], Sequence[fig.Interval]],  # (name, colour) -> intervals of x
 ) -> Any:
     """Draw rows of curves below each other; they are zoomed together along x."""
-    below = [stripes(intervals, name, colour, 0.18) for (name, colour), intervals in shaded.items()]
+    below = [fig.stripes(intervals, name, colour, 0.18) for (name, colour), intervals in shaded.items()]
     panels = []
     for label, curves in rows.items():
-        lines = [curve(x, y, name, COLOURS[k % len(COLOURS)]) for k, (name, y) in enumerate(curves.items())]
+        lines = [fig.curve(x, y, name, fig.COLOURS[k % len(fig.COLOURS)]) for k, (name, y) in enumerate(curves.items())]
         panels.append(panel("", "", x_label, label, lines, *below))
     return _figure(title, panels)
 
 
-def _figure(title: str, panels: Sequence[Panel], titles: Sequence[str] = (), columns: int = 1) -> Any:
+def _figure(title: str, panels: Sequence[fig.Panel], titles: Sequence[str] = (), columns: int = 1) -> Any:
     """Draw panels as one Plotly figure; those in one column are zoomed together along x."""
     from plotly import graph_objects as go
 

@@ -188,7 +188,7 @@ class FrictionFit(Configured):
         self._conclude(learned, compared, remarks, previous is not None)
         self.unfinished_ = None
         for sentence in self.warnings_:
-            warnings.warn(sentence, FitWarning, stacklevel=3)  # at the call of tendonfmu.fit
+            warnings.warn(sentence, FitWarning, stacklevel=4)  # at the call of tendonfmu.fit
         return self
 
     def _prepared(self, source: RecordingSource, held: Held) -> FitRecording:
@@ -374,7 +374,7 @@ def _reported(options: FitOptions) -> dict[str, Any]:
     """Return the options that shape the result, with their names in reports."""
     names = {present: reported for reported, present in EARLIER.items()}
     values = {each.name: getattr(options, each.name) for each in fields(FitOptions)}
-    del values["asymmetric"]
+    del values["asymmetric"], values["progress"]
     reported = {names.get(name, name): value for name, value in values.items()}
     paths = {name: os.fspath(value) for name, value in reported.items() if isinstance(value, os.PathLike)}
     return {**reported, **paths, "sides": _sides(options)}

@@ -15,22 +15,9 @@ from typing import Any
 
 import numpy as np
 
+from tendonfmu import estimate
 from tendonfmu.arrays import Data, Numbers
 from tendonfmu.errors import InputError
-from tendonfmu.estimate import (
-    EffectCoverage,
-    Judgement,
-    Noise,
-    Progress,
-    coverage_of,
-    durations,
-    identifiability,
-    information,
-    judge,
-    noise_of,
-    sensitivities,
-    unknowns,
-)
 from tendonfmu.excite.excitation import SLOW, Excitation, Plan, Stroke, Variation, plan_excitation
 from tendonfmu.files import counted
 from tendonfmu.model import Finger, balanced_forces, native, pretension_vector, read_finger
@@ -86,10 +73,10 @@ class ExciteResult:
     ranges: list[Range]
     motion: Excitation  # the motion
     joints: list[JointCoverage]  # how each joint moves and each friction effect slides
-    effects: list[EffectCoverage]
-    noise: Noise  # the assumed noise
+    effects: list[estimate.EffectCoverage]
+    noise: estimate.Noise  # the assumed noise
     slack: list[float]  # time during which each tendon would have to push [m] (s)
-    judgement: Judgement  # how well the motion identifies each number
+    judgement: estimate.Judgement  # how well the motion identifies each number
 
 
 def read_subject(path: Path) -> Subject:
@@ -240,7 +227,9 @@ def plan_for(subject: Subject, ranges: Sequence[Range], options: ExciteOptions) 
 # --- the whole --------------------------------------------------------------------------------------------------------
 
 
-def excite(subject: Subject, ranges: list[Range], plan: Plan, progress: Progress | None = None) -> ExciteResult:
+def excite(
+    subject: Subject, ranges: list[Range], plan: Plan, progress: estimate.Progress | None = None
+) -> ExciteResult:
     """Plan the motion and judge it."""
     # ranges: [n]
     data = subject.finger.data
@@ -252,12 +241,12 @@ def excite(subject: Subject, ranges: list[Range], plan: Plan, progress: Progress
         "joint_velocity": motion.joint_velocity[::every],
     }
     force = balanced_forces(data, samples, motion.tension[::every])
-    numbers, noise = unknowns(data), noise_of(data, 1 / plan.rate)
-    parts = sensitivities(data, numbers, {**samples, "tendon_force": force}, progress)
-    known = information(parts, samples["time"], np.abs(force).mean(axis=1), noise)
-    coverage = coverage_of(data, motion.joint_position, motion.joint_velocity, durations(motion.time))
+    numbers, noise = estimate.unknowns(data), estimate.noise_of(data, 1 / plan.rate)
+    parts = estimate.sensitivities(data, numbers, {**samples, "tendon_force": force}, progress)
+    known = estimate.information(parts, samples["time"], np.abs(force).mean(axis=1), noise)
+    coverage = estimate.coverage_of(data, motion.joint_position, motion.joint_velocity, estimate.durations(motion.time))
     pulls = np.array([not tendon.get("bidirectional") for tendon in data["tendons"]])
-    slack = ((force < 0) & pulls).T @ durations(samples["time"])
+    slack = ((force < 0) & pulls).T @ estimate.durations(samples["time"])
     return ExciteResult(
         subject=subject,
         plan=plan,
@@ -267,7 +256,7 @@ def excite(subject: Subject, ranges: list[Range], plan: Plan, progress: Progress
         effects=coverage,
         noise=noise,
         slack=slack.tolist(),
-        judgement=judge(numbers, known, coverage),
+        judgement=estimate.judge(numbers, known, coverage),
     )
 
 
@@ -321,11 +310,11 @@ def report(result: ExciteResult, command: str) -> dict[str, Any]:
         "slack": result.slack,
         "assumed_noise": asdict(result.noise),
         "biases": len(finger.joint_names),
-        **identifiability.as_json(result.judgement),
+        **estimate.identifiability.as_json(result.judgement),
     }
 
 
-def _effect_entry(cover: EffectCoverage) -> dict[str, Any]:
+def _effect_entry(cover: estimate.EffectCoverage) -> dict[str, Any]:
     effect = cover.effect
     entry = {
         "path": effect.path,

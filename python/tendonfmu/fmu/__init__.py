@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from .c_array import c_array_report, write_c_array
     from .fmpy_client import run_fmu
     from .model_variables import NOT_IN_XML, VariableTable, elements, group_sizes, read_table, units_of
     from .packaging import (
         build_fmu,
+        c_array_report,
         find_binaries,
         fmu_report,
         guid,
@@ -24,20 +24,24 @@ if TYPE_CHECKING:
         model_identifier,
         pack,
         package_file,
+        write_c_array,
     )
-    from .parameter_set import SetParameter, check_parameter_set_path, parameter_sets, write_parameter_set
     from .reference_results import bridged_rows, reference_run, related_members
     from .running import check_model, columns_of, finger_of, outputs_of, run_model, summary
-    from .system_structure import (
+    from .ssp import (
         OMS,
         SPACES,
         SSC,
         SSD,
         SSV,
+        SetParameter,
+        check_parameter_set_path,
         component,
         connection,
         connectors,
+        parameter_sets,
         parameter_values,
+        write_parameter_set,
         xml_text,
     )
 

@@ -11,23 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu import model as models
 from tendonfmu.errors import InputError
 from tendonfmu.files import FORMATS, counted, path_of
 from tendonfmu.fmu.fmpy_client import Progress, run_fmu
-from tendonfmu.model import (
-    FLAGS,
-    NUMBERS,
-    OPTIONAL_NUMBERS,
-    PLACE,
-    SENSORS,
-    Finger,
-    FingerSource,
-    finger_from_text,
-    inputs_used,
-    native,
-    read_finger,
-    watches_motors,
-)
 from tendonfmu.recordings import Recording
 
 Outputs = dict[str, NDArray[Any]]
@@ -41,10 +28,10 @@ def check_model(model: Path) -> None:
         raise InputError(f"{model}: no such file; expected FINGER.json or FINGER.fmu")
 
 
-def finger_of(model: Path) -> Finger | None:
+def finger_of(model: Path) -> models.Finger | None:
     """Return the description of a model."""
     if model.suffix.lower() == ".json":
-        return read_finger(model)
+        return models.read_finger(model)
     try:
         with zipfile.ZipFile(model) as archive:
             text = archive.read("resources/finger.json")
@@ -52,7 +39,7 @@ def finger_of(model: Path) -> Finger | None:
         return None
     except (OSError, zipfile.BadZipFile) as wrong:
         raise InputError(f"{model}: cannot be read ({wrong}); expected an FMU") from None
-    return finger_from_text(model, text)
+    return models.finger_from_text(model, text)
 
 
 def columns_of(outputs: Mapping[str, NDArray[Any]]) -> Outputs:
@@ -87,7 +74,7 @@ def summary(outputs: Mapping[str, NDArray[Any]]) -> str:
 
 
 def run_model(
-    model: FingerSource, recording: Recording, *, kinematics_source: int = 1, progress: Progress | None = None
+    model: models.FingerSource, recording: Recording, *, kinematics_source: int = 1, progress: Progress | None = None
 ) -> Outputs:
     """Run a finger or an FMU over a recording."""
     # returns `time` [N], then the FMU's outputs by name, [N] or [N, k]
@@ -97,21 +84,21 @@ def run_model(
         if file.suffix.lower() != ".json":
             columns = run_fmu(file, recording, kinematics_source=kinematics_source, progress=progress)
             return outputs_of(columns)
-    outputs = _run_native(read_finger(model), recording, kinematics_source)
+    outputs = _run_native(models.read_finger(model), recording, kinematics_source)
     if progress is not None:
         progress(len(recording))
     return outputs
 
 
-def _run_native(finger: Finger, recording: Recording, source: int) -> Outputs:
+def _run_native(finger: models.Finger, recording: Recording, source: int) -> Outputs:
     """Run a finger in the C library. Raises InputError."""
     if source not in (1, 2, 3):
         raise InputError(f"kinematics = {source!r}: expected 1, 2 or 3")
-    recording.require(finger.joints, finger.tendons, inputs_used(source, watches_motors(finger.data)))
+    recording.require(finger.joints, finger.tendons, models.inputs_used(source, models.watches_motors(finger.data)))
     try:
-        results = native.Instance(finger.image, source).run(recording.arrays())
-    except native.NativeError as refused:
+        results = models.native.Instance(finger.image, source).run(recording.arrays())
+    except models.native.NativeError as refused:
         raise InputError(f"{recording.path}: {refused}") from None
-    names = (*NUMBERS, *OPTIONAL_NUMBERS, *FLAGS, *PLACE, *SENSORS)
+    names = (*models.NUMBERS, *models.OPTIONAL_NUMBERS, *models.FLAGS, *models.PLACE, *models.SENSORS)
     outputs = {name: results[name] for name in names if name in results}
     return {"time": recording.time, **outputs}

@@ -13,6 +13,7 @@ from tendonfmu.lazy_exports import lazy_exports
 if TYPE_CHECKING:
     from . import detect_text, diagnosis_page, diagnosis_text, excite_text, fit_page, fit_text
     from .calibration_figures import MotionShown, PushShown, motion_sheet, push_sheet, pushes_sheet
+    from .detect_figures import score_sheets, tail_sheet, write_score_figures, write_tune_figures
     from .diagnosis_figures import diagnosis_sheets
     from .diagnosis_files import REPORT, build_report, check_folder, write_diagnosis
     from .diagnosis_text import confusion_sentence, error_sentence, gain_text, left_sentence, names_of, unit_of
@@ -26,7 +27,5 @@ if TYPE_CHECKING:
     from .page import Tile, make_folder, render, write_figures
     from .rerun_recording import check_rerun, write_rerun
     from .run_page import check_page, run_report, run_sheets, write_run_page
-    from .score_figures import score_sheets, write_score_figures
-    from .tune_figures import tail_sheet, write_tune_figures
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

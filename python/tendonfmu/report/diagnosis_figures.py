@@ -9,25 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from tendonfmu import drawing as draw
 from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis import Cause, Diagnosis, Evidence, Names, ResidualView, at_place
-from tendonfmu.drawing import (
-    BLUE,
-    DARK,
-    DIVERGING,
-    GREY,
-    VERMILION,
-    Interval,
-    Panel,
-    Sheet,
-    Trace,
-    band,
-    bars,
-    curve,
-    dots,
-    heat,
-    panel,
-)
 from tendonfmu.files import counted
 from tendonfmu.report.diagnosis_text import names_of, unit_of
 from tendonfmu.report.diagnosis_words import Words, words_of
@@ -48,7 +32,7 @@ _BINNED = ("angle", "velocity", "tendon_force", "load", "travel")
 _ROOM = 3.0  # times the largest mean: the y axis shows no more of the scatter, so that the means stay visible
 
 
-def diagnosis_sheets(diagnosis: Diagnosis) -> list[Sheet]:
+def diagnosis_sheets(diagnosis: Diagnosis) -> list[draw.Sheet]:
     """Make the sheets of a diagnosis: the evidence for each cause, then the residual at each joint."""
     names = names_of(diagnosis)
     return [
@@ -62,7 +46,7 @@ def diagnosis_sheets(diagnosis: Diagnosis) -> list[Sheet]:
     ]
 
 
-def _map_sheets(diagnosis: Diagnosis, names: Names) -> Iterator[Sheet]:
+def _map_sheets(diagnosis: Diagnosis, names: Names) -> Iterator[draw.Sheet]:
     """Show where a part without a name is, over the two signals that it follows best."""
     shown, (factor, unit) = diagnosis.unexplained.map, unit_of(diagnosis)
     if shown is None:
@@ -72,30 +56,30 @@ def _map_sheets(diagnosis: Diagnosis, names: Names) -> Iterator[Sheet]:
     joint, (one, two) = names.joint(shown.joint), shown.labels
     x, y = (0.5 * (edges[1:] + edges[:-1]) for edges in shown.edges)
     title = f"What remains at {joint}, over {one.split(' (')[0]} and {two.split(' (')[0]}"
-    drawn = panel(
+    drawn = draw.panel(
         "Mean residual of the extended model" if diagnosis.torque_causes else "Mean residual",
         f"{title}, from {-most:.2g} to {most:.2g} {unit}",
         one,
         two,
-        heat(torque, x, y, DIVERGING, (-most, most), unit),
+        draw.heat(torque, x, y, draw.DIVERGING, (-most, most), unit),
         note=f"blue −{most:.2g}, red +{most:.2g} {unit}",
     )
     caption = "One colour in a whole region is a torque that comes back there each time. Cells without data are empty."
-    yield Sheet("views", "views_map", title, [drawn], caption)
+    yield draw.Sheet("views", "views_map", title, [drawn], caption)
 
 
 # --- evidence for a cause ---------------------------------------------------------------------------------------------
 
 
-def _cause_sheet(diagnosis: Diagnosis, names: Names, number: int, cause: Cause) -> Sheet:
+def _cause_sheet(diagnosis: Diagnosis, names: Names, number: int, cause: Cause) -> draw.Sheet:
     factor, unit = unit_of(diagnosis)
     limits = _same_scale(cause.evidence, factor)
     panels = [_evidence_panel(each, names, (factor, unit), limits, bool(cause.changed)) for each in cause.evidence]
     title = f"{number}. {at_place(capital(cause.title), cause.where, names)}"
-    return Sheet(f"cause_{number}", f"cause_{number}", title, [*panels, *_by_recording(diagnosis, cause)])
+    return draw.Sheet(f"cause_{number}", f"cause_{number}", title, [*panels, *_by_recording(diagnosis, cause)])
 
 
-def _by_recording(diagnosis: Diagnosis, cause: Cause) -> Iterator[Panel]:
+def _by_recording(diagnosis: Diagnosis, cause: Cause) -> Iterator[draw.Panel]:
     """Show how large a change is in each of several new recordings."""
     changed = cause.changed
     if changed is None or not changed.by:
@@ -104,33 +88,35 @@ def _by_recording(diagnosis: Diagnosis, cause: Cause) -> Iterator[Panel]:
     x = np.arange(1.0, len(changed.by) + 1.0)
     value, low, high = with_ends(changed.by, factor)
     then = np.full(2, factor * changed.reference.value)
-    yield panel(
+    yield draw.panel(
         "In each of the new recordings",
         f"Size of this change in each of {counted(len(changed.by), 'new recording')}, in their order",
         "new recording, in the order given",
         f"{changed.number.replace('_', ' ')} ({unit})",
-        bars(x, low, high, "", BLUE, 1.0),
-        curve(x, value, "", BLUE, 0.9, alpha=0.45),
-        curve([1.0, x[-1]], then, "", GREY, 1.1, "dash"),
-        dots(x, value),
+        draw.bars(x, low, high, "", draw.BLUE, 1.0),
+        draw.curve(x, value, "", draw.BLUE, 0.9, alpha=0.45),
+        draw.curve([1.0, x[-1]], then, "", draw.GREY, 1.1, "dash"),
+        draw.dots(x, value),
         x_ticks=[(float(k), str(int(k))) for k in x] if len(x) <= 12 else (),
     )
 
 
 def _evidence_panel(
-    evidence: Evidence, names: Names, scale: tuple[float, str], limits: Interval | None, changed: bool
-) -> Panel:
+    evidence: Evidence, names: Names, scale: tuple[float, str], limits: draw.Interval | None, changed: bool
+) -> draw.Panel:
     factor, unit = scale
     words = ("now", "now, with the change in the model") if changed else ("without it", "with it")
-    shown = zip((*words, "then, in the reference"), (VERMILION, BLUE, DARK), _means_of(evidence), strict=False)
+    shown = zip(
+        (*words, "then, in the reference"), (draw.VERMILION, draw.BLUE, draw.DARK), _means_of(evidence), strict=False
+    )
     x, x_unit = (factor * evidence.coordinate, unit) if evidence.unit == "N·m" else (evidence.coordinate, evidence.unit)
-    intervals, lines, points = list[Trace](), list[Trace](), list[Trace]()
+    intervals, lines, points = list[draw.Trace](), list[draw.Trace](), list[draw.Trace]()
     for name, colour, (low, mean, high) in shown:
-        interval = "95 % interval of the mean" if colour == BLUE else ""
-        intervals += bars(x, factor * low, factor * high, interval, colour, 1.2)
-        lines.append(curve(x, factor * mean, "", colour, 0.9, alpha=0.45))
-        points.append(dots(x, factor * mean, name, colour))
-    return panel(
+        interval = "95 % interval of the mean" if colour == draw.BLUE else ""
+        intervals += draw.bars(x, factor * low, factor * high, interval, colour, 1.2)
+        lines.append(draw.curve(x, factor * mean, "", colour, 0.9, alpha=0.45))
+        points.append(draw.dots(x, factor * mean, name, colour))
+    return draw.panel(
         f"Residual at {names.joint(evidence.joint)}",
         f"Mean residual at {names.joint(evidence.joint)} over {evidence.label}, without and with this in the model",
         f"{evidence.label} ({x_unit})",
@@ -157,7 +143,7 @@ def _near(travel: Numbers) -> float:
     return float(np.quantile(size, 0.25)) if len(size) else 0.0
 
 
-def _same_scale(evidence: Sequence[Evidence], factor: float) -> Interval | None:
+def _same_scale(evidence: Sequence[Evidence], factor: float) -> draw.Interval | None:
     """Return the y limits of several panels, so that they can be compared."""
     ends = [factor * end for each in evidence for low, _, high in _means_of(each) for end in (*low, *high)]
     ends = [end for end in ends if math.isfinite(end)]
@@ -183,14 +169,14 @@ def _order(kind: str) -> int:
     return list(_TITLES).index(kind) if kind in _TITLES else len(_TITLES)
 
 
-def _joint_sheet(diagnosis: Diagnosis, names: Names, joint: int, views: Sequence[ResidualView]) -> Sheet:
+def _joint_sheet(diagnosis: Diagnosis, names: Names, joint: int, views: Sequence[ResidualView]) -> draw.Sheet:
     factor, unit = unit_of(diagnosis)
     if not diagnosis.torque_causes:  # the extended model is the nominal one
         views = [replace(view, after=np.full_like(view.after, math.nan)) for view in views]
     limits = _shared_limits([view for view in views if view.kind in _BINNED], factor)
     words, title = words_of(diagnosis.kind), f"Residual at {names.joint(joint)}"
     panels = [_view_panel(view, names, factor, unit, limits, words) for view in views]
-    return Sheet("views", f"residual_{joint}", title, panels)
+    return draw.Sheet("views", f"residual_{joint}", title, panels)
 
 
 def _shared_limits(views: Sequence[ResidualView], factor: float) -> tuple[float, float] | None:
@@ -207,7 +193,7 @@ def _shared_limits(views: Sequence[ResidualView], factor: float) -> tuple[float,
 
 def _view_panel(
     view: ResidualView, names: Names, factor: float, unit: str, limits: tuple[float, float] | None, words: Words
-) -> Panel:
+) -> draw.Panel:
     title = _TITLES.get(view.kind, f"Over {view.label}")
     models = f"of the {words.nominal} and of the {words.extended}"
     alt = f"Residual at {names.joint(view.joint)}, {title.lower()}, {models}"
@@ -215,26 +201,26 @@ def _view_panel(
         view = replace(view, x=factor * view.x, unit=unit)
     x_label = f"{view.label} ({view.unit})" if view.unit not in ("", "1") else view.label
 
-    def drawn(y_label: str, factor: float, *below: Trace | list[Trace], **axes: Any) -> Panel:
+    def drawn(y_label: str, factor: float, *below: draw.Trace | list[draw.Trace], **axes: Any) -> draw.Panel:
         shown = view.x > 0 if view.kind == "spectrum" else slice(None)
         before, after = (factor * values[shown] for values in (view.before, view.after))
         lines = (
-            curve(view.x[shown], before, words.refitted, VERMILION, 1.0, alpha=0.9),
-            curve(view.x[shown], after, words.extended, BLUE, 1.0),
+            draw.curve(view.x[shown], before, words.refitted, draw.VERMILION, 1.0, alpha=0.9),
+            draw.curve(view.x[shown], after, words.extended, draw.BLUE, 1.0),
         )
-        return panel(title, alt, x_label, y_label, *below, *lines, **axes)
+        return draw.panel(title, alt, x_label, y_label, *below, *lines, **axes)
 
     if view.kind == "spectrum":
         return drawn(f"power (({unit})²/Hz)", factor**2, log_x=True, log_y=True)
     if view.kind == "autocorrelation":
         least = min(-0.25, 1.1 * float(np.nanmin([view.before, view.after])))
-        zero = curve(view.x, np.zeros_like(view.x), "", GREY, 1.1, "dash")
+        zero = draw.curve(view.x, np.zeros_like(view.x), "", draw.GREY, 1.1, "dash")
         return drawn("", 1.0, zero, y_limits=(least, 1.05))
     if view.kind not in _BINNED:
         return drawn(f"residual ({unit})", factor, zoom=view.kind if view.kind == "time" else "")
-    scatter: list[Trace] = []
+    scatter: list[draw.Trace] = []
     if view.before_std is not None:
         low, high = (factor * (view.before + side * view.before_std) for side in (-1, 1))
-        scatter = band(view.x, low, high, f"scatter within a bin, {words.nominal}", VERMILION, 0.13)
+        scatter = draw.band(view.x, low, high, f"scatter within a bin, {words.nominal}", draw.VERMILION, 0.13)
     near = _near(view.x) if view.kind == "travel" else 0.0
     return drawn(f"residual ({unit})", factor, scatter, y_limits=limits, near_x=near)

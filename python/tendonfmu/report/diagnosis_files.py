@@ -16,18 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from tendonfmu.diagnosis import (
-    Cause,
-    ChangedSize,
-    DetectionGain,
-    Diagnosis,
-    Experiment,
-    ResidualView,
-    Sensor,
-    Where,
-    at_place,
-    reported_causes,
-)
+from tendonfmu import diagnosis as found
 from tendonfmu.errors import OutputError, own_fault
 from tendonfmu.files import (
     check_output_folder,
@@ -56,7 +45,7 @@ def check_folder(folder: Path, inputs: Sequence[Path]) -> None:
     check_output_folder(folder, (REPORT, EXTENDED, EXTENDED_FMU, PAGE, NOMINAL), inputs)
 
 
-def write_diagnosis(diagnosis: Diagnosis, folder: Path) -> dict[Path, str]:
+def write_diagnosis(diagnosis: found.Diagnosis, folder: Path) -> dict[Path, str]:
     """Write the report, both descriptions, the FMU and the page."""
     beside = folder.absolute().parent
     try:
@@ -74,7 +63,7 @@ def write_diagnosis(diagnosis: Diagnosis, folder: Path) -> dict[Path, str]:
     return {folder / file.name: what for file, what in made.items()}
 
 
-def _make_for(diagnosis: Diagnosis, folder: Path, named: Path) -> dict[Path, str]:
+def _make_for(diagnosis: found.Diagnosis, folder: Path, named: Path) -> dict[Path, str]:
     """Make the files in a folder. A refusal names the folder that the user gave."""
     try:
         return _make(diagnosis, folder)
@@ -115,7 +104,7 @@ def _move(files: Iterable[Path], folder: Path, old: Path) -> None:
         raise
 
 
-def _make(diagnosis: Diagnosis, folder: Path) -> dict[Path, str]:
+def _make(diagnosis: found.Diagnosis, folder: Path) -> dict[Path, str]:
     """Write all files to an empty folder."""
     write_text(folder / PAGE, diagnosis_page(diagnosis))
     causes = len(diagnosis.causes)
@@ -137,7 +126,7 @@ def _make(diagnosis: Diagnosis, folder: Path) -> dict[Path, str]:
 # --- the report -------------------------------------------------------------------------------------------------------
 
 
-def build_report(diagnosis: Diagnosis, files: Sequence[str] = ()) -> dict[str, Any]:
+def build_report(diagnosis: found.Diagnosis, files: Sequence[str] = ()) -> dict[str, Any]:
     """Make the report of a diagnosis."""
     effect = ("title", "surviving_share", "ordinary_gain", "needed_gain", "experiment")
     report = {
@@ -147,7 +136,7 @@ def build_report(diagnosis: Diagnosis, files: Sequence[str] = ()) -> dict[str, A
         "extended": _plain(diagnosis.extended) | {"finger": EXTENDED, "fmu": EXTENDED_FMU},
         "delivered": dict(zip(("nominal", "extended"), _plain(diagnosis.delivered), strict=True)),
         **_fields(diagnosis, "noise_floor", "gain"),
-        "causes": [_cause(cause, diagnosis.kind) for cause in reported_causes(diagnosis)],
+        "causes": [_cause(cause, diagnosis.kind) for cause in found.reported_causes(diagnosis)],
         "too_small": [_cause(cause, diagnosis.kind) for cause in diagnosis.too_small],
         "uncertain": [
             _cause(cause, diagnosis.kind) | {"experiment": cause.experiment} for cause in diagnosis.uncertain
@@ -190,11 +179,11 @@ def _fields(source: Any, *names: str) -> dict[str, Any]:
     return {name: _plain(getattr(source, name)) for name in names}
 
 
-def _where(where: Where) -> dict[str, Any]:
+def _where(where: found.Where) -> dict[str, Any]:
     return _fields(where, "effect", "joint", "tendon")
 
 
-def _cause(cause: Cause, kind: str) -> dict[str, Any]:
+def _cause(cause: found.Cause, kind: str) -> dict[str, Any]:
     return {
         **_where(cause.where),
         **_fields(cause, "p_value", "gain", "gain_unit"),
@@ -209,11 +198,11 @@ def _cause(cause: Cause, kind: str) -> dict[str, Any]:
     }
 
 
-def _sensor(sensor: Sensor) -> dict[str, Any]:
+def _sensor(sensor: found.Sensor) -> dict[str, Any]:
     return _where(sensor.where) | _fields(sensor, "correction", "unit")
 
 
-def _changed(changed: ChangedSize | None) -> dict[str, Any]:
+def _changed(changed: found.ChangedSize | None) -> dict[str, Any]:
     """Return the main number in the reference and now; null where there is none, as for contact."""
     if changed is None:
         return {"reference": None, "now": None}
@@ -235,18 +224,18 @@ def _numbers_of(parameters: Mapping[str, tuple[float, str]], intervals: Mapping[
     }
 
 
-def _waterfall(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+def _waterfall(diagnosis: found.Diagnosis) -> list[dict[str, Any]]:
     """List the rms over all joints on unseen data: of the nominal model, then after each cause."""
     names = names_of(diagnosis)
-    steps = [(words_of(diagnosis.kind).nominal, Where("", None, None))]
-    steps += [(at_place(cause.title, cause.where, names), cause.where) for cause in diagnosis.torque_causes]
+    steps = [(words_of(diagnosis.kind).nominal, found.Where("", None, None))]
+    steps += [(found.at_place(cause.title, cause.where, names), cause.where) for cause in diagnosis.torque_causes]
     return [
         {"label": label, "effect": where.effect or None, "joint": where.joint, "tendon": where.tendon, "rms": rms}
         for (label, where), rms in zip(steps, diagnosis.steps, strict=True)
     ]
 
 
-def _experiment(experiment: Experiment) -> dict[str, Any]:
+def _experiment(experiment: found.Experiment) -> dict[str, Any]:
     return {
         **_fields(experiment, "sentence", "distance"),
         "separates": [[_where(one), _where(other)] for one, other in experiment.separates],
@@ -255,7 +244,7 @@ def _experiment(experiment: Experiment) -> dict[str, Any]:
     }
 
 
-def _detection(gain: DetectionGain) -> dict[str, Any]:
+def _detection(gain: found.DetectionGain) -> dict[str, Any]:
     def of(when: str) -> dict[str, Any]:
         return {
             "found": getattr(gain, f"found_{when}"),
@@ -267,6 +256,6 @@ def _detection(gain: DetectionGain) -> dict[str, Any]:
     return {"events": gain.events, "nominal": of("before"), "extended": of("after")}
 
 
-def _view(view: ResidualView) -> dict[str, Any]:
+def _view(view: found.ResidualView) -> dict[str, Any]:
     names = {"before": "nominal", "after": "extended", "before_std": "nominal_std"}
     return {"nominal_std": None, **_plain(view, **names)}

@@ -18,27 +18,8 @@ from tendonfmu.diagnosis import (
     title_of,
 )
 from tendonfmu.files import counted
+from tendonfmu.report import diagnosis_text as texts
 from tendonfmu.report.diagnosis_figures import diagnosis_sheets
-from tendonfmu.report.diagnosis_text import (
-    change_rows,
-    confusion_sentence,
-    error_rows,
-    error_sentence,
-    gain_text,
-    has_rivals,
-    headline,
-    hidden,
-    hidden_sentences,
-    left_of,
-    left_sentence,
-    names_of,
-    next_sentence,
-    place_rows,
-    tested_sentence,
-    too_small_sentence,
-    unit_of,
-    unseen,
-)
 from tendonfmu.report.diagnosis_words import words_of
 from tendonfmu.report.marked_finger import finger_figure
 from tendonfmu.report.numbers import (
@@ -62,7 +43,7 @@ _TONES = {"adequate": "good", "explained": "good", "partly explained": "", "unex
 
 def diagnosis_page(diagnosis: Diagnosis) -> str:
     """Return the HTML text of the page of a diagnosis."""
-    names, (factor, unit) = names_of(diagnosis), unit_of(diagnosis)
+    names, (factor, unit) = texts.names_of(diagnosis), texts.unit_of(diagnosis)
     return render(
         "diagnosis.html.jinja",
         diagnosis_sheets(diagnosis),
@@ -90,7 +71,7 @@ def diagnosis_page(diagnosis: Diagnosis) -> str:
                 "" if effect.gain is None else percent(effect.gain),
                 effect.experiment,
             )
-            for effect in hidden(diagnosis, names)
+            for effect in texts.hidden(diagnosis, names)
         ],
         recordings=list(_recordings(diagnosis)),
     )
@@ -101,19 +82,19 @@ def diagnosis_page(diagnosis: Diagnosis) -> str:
 
 def _first_screen(diagnosis: Diagnosis, names: Names) -> dict[str, Any]:
     return {
-        "tone": "" if any(map(has_rivals, diagnosis.causes)) else _TONES[diagnosis.verdict],
-        "headline": headline(diagnosis),
-        "error": error_sentence(diagnosis),
-        "left": left_sentence(diagnosis),
+        "tone": "" if any(map(texts.has_rivals, diagnosis.causes)) else _TONES[diagnosis.verdict],
+        "headline": texts.headline(diagnosis),
+        "error": texts.error_sentence(diagnosis),
+        "left": texts.left_sentence(diagnosis),
         "tiles": list(_tiles(diagnosis)),
         "untold": list(_untold(diagnosis, names)),
-        "next": next_sentence(diagnosis),
+        "next": texts.next_sentence(diagnosis),
         "experiment": list(_experiment(diagnosis, names)),
     }
 
 
 def _tiles(diagnosis: Diagnosis) -> Iterator[Tile]:
-    words, (factor, unit) = words_of(diagnosis.kind), unit_of(diagnosis)
+    words, (factor, unit) = words_of(diagnosis.kind), texts.unit_of(diagnosis)
     before, after = (rounded(factor * together(model.test_rms)) for model in (diagnosis.nominal, diagnosis.extended))
     if diagnosis.torque_causes:
         yield Tile(
@@ -125,7 +106,7 @@ def _tiles(diagnosis: Diagnosis) -> Iterator[Tile]:
         yield Tile(percent(diagnosis.gain.value), "", f"less error, 95 % interval {low} to {high}")
     else:
         yield Tile(before, unit, "error on test data, all joints")
-    if left := left_of(diagnosis):
+    if left := texts.left_of(diagnosis):
         noise = ":" if left.memory else " is noise:"
         yield Tile(left.text(left.noise), unit, f"of what remains{noise} no recorded signal predicts it")
         if left.predictable > 0.0:
@@ -134,9 +115,9 @@ def _tiles(diagnosis: Diagnosis) -> Iterator[Tile]:
 
 def _untold(diagnosis: Diagnosis, names: Names) -> Iterator[str]:
     for k, cause in enumerate(diagnosis.causes, start=1):
-        if text := confusion_sentence(cause, names):
+        if text := texts.confusion_sentence(cause, names):
             yield f"Cause {k}, {at_place(cause.title, cause.where, names)}: {text[0].lower()}{text[1:]}"
-    yield from hidden_sentences(diagnosis, names)
+    yield from texts.hidden_sentences(diagnosis, names)
 
 
 def _experiment(diagnosis: Diagnosis, names: Names) -> Iterator[str]:
@@ -168,20 +149,20 @@ def _card(diagnosis: Diagnosis, cause: Cause, names: Names) -> dict[str, Any]:
         "place": capital(names.places(cause)),
         "size": cause.size,
         "long": len(cause.size) > _LONG,
-        "gain": gain_text(diagnosis, cause),
+        "gain": texts.gain_text(diagnosis, cause),
         "certainty": certainty,
         "explanation": cause.explanation,
-        "confusion": confusion_sentence(cause, names),
-        "places": place_rows(cause, names, sizes) if cause.parameters and not cause.sensors else [],
+        "confusion": texts.confusion_sentence(cause, names),
+        "places": texts.place_rows(cause, names, sizes) if cause.parameters and not cause.sensors else [],
         "sensors": [sensor.words for sensor in cause.sensors],
         "parameters": [(path, magnitude(*number)) for path, number in cause.parameters.items()],
-        "sizes": change_rows(cause, diagnosis.recordings),
+        "sizes": texts.change_rows(cause, diagnosis.recordings),
     }
 
 
 def _too_small(diagnosis: Diagnosis, names: Names) -> dict[str, Any]:
     return {
-        "sentence": too_small_sentence(diagnosis),
+        "sentence": texts.too_small_sentence(diagnosis),
         "rows": [
             (capital(cause.title), names.places(cause), percent_interval(cause.gain), probability(cause.p_value))
             for cause in diagnosis.too_small
@@ -192,7 +173,7 @@ def _too_small(diagnosis: Diagnosis, names: Names) -> dict[str, Any]:
 def _errors(diagnosis: Diagnosis, names: Names, factor: float) -> list[dict[str, Any]]:
     """List the errors: a row per joint, then one for all joints; rms values first, then the lag-one correlations."""
     rows = []
-    for j, row in enumerate(error_rows(diagnosis, names, factor)):
+    for j, row in enumerate(texts.error_rows(diagnosis, names, factor)):
         total = j == len(diagnosis.nominal.train_rms)
         known = j < len(diagnosis.whiteness) and not total
         white = [rounded(value, 2) for value in diagnosis.whiteness[j]] if known else ["", ""]
@@ -250,11 +231,11 @@ def _method(diagnosis: Diagnosis) -> Iterator[str]:
     """Describe the method and its main numbers in sentences."""
     yield words_of(diagnosis.kind).method.format(least=percent(diagnosis.least_gain))
     yield "Errors and gains are of means of 10 ms, less one constant a joint and recording: no bias learns."
-    if text := tested_sentence(diagnosis):
+    if text := texts.tested_sentence(diagnosis):
         yield text
     if diagnosis.repeated:
         yield f"{counted(diagnosis.repeated, 'motion')} of the reference, made again, were compared sample by sample."
-    yield f"The gain was measured on {unseen(diagnosis)}, by running both models there. Seed {diagnosis.seed}."
+    yield f"The gain was measured on {texts.unseen(diagnosis)}, by running both models there. Seed {diagnosis.seed}."
 
 
 # --- how much error each cause takes away -----------------------------------------------------------------------------
@@ -288,7 +269,7 @@ class Waterfall(NamedTuple):
 
 def waterfall_of(diagnosis: Diagnosis, names: Names) -> Waterfall:
     """Return the waterfall of a diagnosis."""
-    (factor, unit), words, left = unit_of(diagnosis), words_of(diagnosis.kind), left_of(diagnosis)
+    (factor, unit), words, left = texts.unit_of(diagnosis), words_of(diagnosis.kind), texts.left_of(diagnosis)
     steps = [factor * step for step in diagnosis.steps]
     widest = max([step for step in steps if math.isfinite(step)], default=0.0) or 1.0
     digits = decimals(widest)

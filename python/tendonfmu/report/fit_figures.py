@@ -13,24 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tendonfmu import drawing as draw
 from tendonfmu.arrays import Flags, Numbers
-from tendonfmu.drawing import (
-    BLUE,
-    DARK,
-    GREY,
-    ORANGE,
-    SKY,
-    Interval,
-    Panel,
-    Sheet,
-    Trace,
-    band,
-    curve,
-    dots,
-    mark,
-    panel,
-    stripes,
-)
+from tendonfmu.drawing import panel
 from tendonfmu.estimate import FitPicture, FitSeries, identifiability
 from tendonfmu.recordings import flagged_stretches
 from tendonfmu.report.fit_laws import law_sheets
@@ -56,7 +41,7 @@ _RESIDUAL_CAPTION = (
 )
 
 
-def fit_sheets(picture: FitPicture) -> list[Sheet]:
+def fit_sheets(picture: FitPicture) -> list[draw.Sheet]:
     """Make all figures of a fit, in the order of the page."""
     return [
         *torque_sheets(picture),
@@ -74,7 +59,7 @@ def unit_of(series: Sequence[FitSeries]) -> tuple[float, str]:
 # --- torque over time -------------------------------------------------------------------------------------------------
 
 
-def torque_sheets(picture: FitPicture) -> Iterator[Sheet]:
+def torque_sheets(picture: FitPicture) -> Iterator[draw.Sheet]:
     """Show the torque over time, ten seconds of each set of data."""
     first = BEGIN
     explanation = (
@@ -90,7 +75,7 @@ def torque_sheets(picture: FitPicture) -> Iterator[Sheet]:
         joints, name = picture.fitted.joint_names, f"torque_{number}"
         scale = unit_of([series])
         panels = [_torque_panel(series, shown, j, joint, scale, name) for j, joint in enumerate(joints)]
-        yield Sheet(
+        yield draw.Sheet(
             "torque",
             name,
             f"{part}: {series.label}, {begin:.0f} to {end:.0f} s",
@@ -126,7 +111,9 @@ def _window(time: Numbers, where: Flags, first: float) -> NDArray[np.bool_]:
     return np.asarray((time >= begin) & (time <= min(end, begin + SHOWN)))
 
 
-def _torque_panel(series: FitSeries, shown: Flags, j: int, name: str, scale: tuple[float, str], zoom: str) -> Panel:
+def _torque_panel(
+    series: FitSeries, shown: Flags, j: int, name: str, scale: tuple[float, str], zoom: str
+) -> draw.Panel:
     factor, unit = scale
     time, torque, residual = series.time[shown], series.torque[shown, j], series.residual[shown, j]
     predicted = torque - residual
@@ -135,8 +122,8 @@ def _torque_panel(series: FitSeries, shown: Flags, j: int, name: str, scale: tup
     share = f"{100 * left / size:.0f} %" if size > 0 and np.isfinite(left) else "unknown"
     gaps = _gaps(series.time, time)
 
-    def drawn(values: Numbers, *style: Any, **more: Any) -> Trace:
-        return curve(np.insert(time, gaps, np.nan), factor * np.insert(values, gaps, np.nan), *style, **more)
+    def drawn(values: Numbers, *style: Any, **more: Any) -> draw.Trace:
+        return draw.curve(np.insert(time, gaps, np.nan), factor * np.insert(values, gaps, np.nan), *style, **more)
 
     return panel(
         name,
@@ -145,9 +132,9 @@ def _torque_panel(series: FitSeries, shown: Flags, j: int, name: str, scale: tup
         f"{unit}.",
         "time (s)",
         f"torque ({unit})",
-        drawn(torque, "measured joint torque", DARK, 1.0),
-        drawn(bias, "bias alone", ORANGE, 0.8, alpha=0.8),
-        drawn(predicted, "model with bias, before the bias learns from the sample", SKY, 1.5),
+        drawn(torque, "measured joint torque", draw.DARK, 1.0),
+        drawn(bias, "bias alone", draw.ORANGE, 0.8, alpha=0.8),
+        drawn(predicted, "model with bias, before the bias learns from the sample", draw.SKY, 1.5),
         note=f"residual {share} of torque",
         size="medium",
         x_limits=(float(time[0]), float(time[-1])),
@@ -164,7 +151,7 @@ def _gaps(all_times: Numbers, time: Numbers) -> NDArray[np.intp]:
 # --- residual ---------------------------------------------------------------------------------------------------------
 
 
-def residual_sheets(picture: FitPicture) -> Iterator[Sheet]:
+def residual_sheets(picture: FitPicture) -> Iterator[draw.Sheet]:
     """Show the residual of each joint over time, angle and velocity: all training data, then each comparison."""
     training = [series for series in picture.series if series.role == "training"]
     if training:
@@ -174,7 +161,7 @@ def residual_sheets(picture: FitPicture) -> Iterator[Sheet]:
         yield _residual_sheet(picture, [series], f"Not trained on: {series.label}", number)
 
 
-def _residual_sheet(picture: FitPicture, series: Sequence[FitSeries], title: str, number: int) -> Sheet:
+def _residual_sheet(picture: FitPicture, series: Sequence[FitSeries], title: str, number: int) -> draw.Sheet:
     scale = unit_of(series)
     zoom = f"residual_{number}"
     panels = [
@@ -182,12 +169,12 @@ def _residual_sheet(picture: FitPicture, series: Sequence[FitSeries], title: str
         for j, name in enumerate(picture.fitted.joint_names)
         for panel in _residual_panels(series, j, name, scale, zoom)
     ]
-    return Sheet("residual", zoom, title, panels, _RESIDUAL_CAPTION if number == 1 else "")
+    return draw.Sheet("residual", zoom, title, panels, _RESIDUAL_CAPTION if number == 1 else "")
 
 
 def _residual_panels(
     series: Sequence[FitSeries], j: int, name: str, scale: tuple[float, str], zoom: str
-) -> Iterator[Panel]:
+) -> Iterator[draw.Panel]:
     factor, unit = scale
     residual = factor * np.concatenate([one.residual[:, j] for one in series])
     judged = np.isfinite(residual) & np.concatenate([_judged(one) for one in series])  # NaN: no kinematics there
@@ -210,9 +197,9 @@ def _residual_panels(
             f"its rms is {rms(residual[judged]):.3g} {unit}.",
             x_label,
             f"residual ({unit})",
-            band(centre, low, high, "10 to 90 % of the samples", SKY, 0.35),
-            curve(centre, middle, "median", BLUE, 1.6),
-            stripes(held if even else [], "held out of training", ORANGE, 0.16),
+            draw.band(centre, low, high, "10 to 90 % of the samples", draw.SKY, 0.35),
+            draw.curve(centre, middle, "median", draw.BLUE, 1.6),
+            draw.stripes(held if even else [], "held out of training", draw.ORANGE, 0.16),
             note=f"rms {rms(residual[judged]):.3g} {unit}" if even else "",
             y_limits=(-limit, limit) if limit > 0 else None,
             zoom=zoom if even else "",
@@ -226,9 +213,9 @@ def _judged(series: FitSeries) -> Flags:
     return series.used if series.held_out is None else series.used | series.held_out
 
 
-def _end_to_end(series: Sequence[FitSeries]) -> tuple[Numbers, list[Interval]]:
+def _end_to_end(series: Sequence[FitSeries]) -> tuple[Numbers, list[draw.Interval]]:
     """Return the times of recordings joined end to end, from 0, and the intervals that were held out."""
-    times, held, begin = [], list[Interval](), 0.0
+    times, held, begin = [], list[draw.Interval](), 0.0
     for one in series:
         time = one.time - one.time[0] + begin
         times.append(time)
@@ -284,7 +271,7 @@ def relative_error(entry: Mapping[str, Any]) -> float:
     return abs(float(error) / float(value))
 
 
-def error_sheet(picture: FitPicture) -> Sheet:
+def error_sheet(picture: FitPicture) -> draw.Sheet:
     """Show every estimated number as a dot, by kind."""
     entries = picture.report["parameters"]
     kinds = sorted({kind_of(entry["path"]) for entry in entries})
@@ -305,7 +292,7 @@ def error_sheet(picture: FitPicture) -> Sheet:
         "standard error / value",
         "",
         *_dots(members),
-        mark(identifiability.LIMIT),
+        draw.mark(identifiability.LIMIT),
         size="large",
         log_x=True,
         x_limits=_SHOWN,
@@ -313,7 +300,7 @@ def error_sheet(picture: FitPicture) -> Sheet:
         rows=names,
         height=90 + 24 * len(names),
     )
-    return Sheet(
+    return draw.Sheet(
         "errors",
         "standard_errors",
         "How well each number is known",
@@ -323,7 +310,7 @@ def error_sheet(picture: FitPicture) -> Sheet:
     )
 
 
-def _dots(members: list[list[Mapping[str, Any]]]) -> Iterator[Trace]:
+def _dots(members: list[list[Mapping[str, Any]]]) -> Iterator[draw.Trace]:
     """Place the dots of a row side by side in the order of the description, so that none hides another."""
     for name, wanted in (("identified", True), ("not identified", False)):
         x, y = list[float](), list[float]()
@@ -332,7 +319,7 @@ def _dots(members: list[list[Mapping[str, Any]]]) -> Iterator[Trace]:
                 if bool(entry["identified"]) == wanted:
                     x.append(float(np.clip(relative_error(entry), *_SHOWN)))
                     y.append(row + (0.6 * (k + 0.5) / len(entries) - 0.3))
-        yield dots(x, y, name, *((BLUE, 0.7) if wanted else (GREY, 1.0)), ring=not wanted)
+        yield draw.dots(x, y, name, *((draw.BLUE, 0.7) if wanted else (draw.GREY, 1.0)), ring=not wanted)
 
 
 # --- correlation ------------------------------------------------------------------------------------------------------

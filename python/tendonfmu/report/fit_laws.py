@@ -6,22 +6,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from tendonfmu import drawing as draw
 from tendonfmu.arrays import Numbers
-from tendonfmu.drawing import (
-    BLUE,
-    GREY,
-    ORANGE,
-    SILVER,
-    VERMILION,
-    Panel,
-    Sheet,
-    Trace,
-    band,
-    curve,
-    histogram,
-    panel,
-    stripes,
-)
+from tendonfmu.drawing import curve
 from tendonfmu.estimate import FitPicture, LawBands, LawCurve, asymmetric, numbers_of
 from tendonfmu.files import are, counted
 from tendonfmu.model import Effect, effects, sliding_velocity, velocity_threshold
@@ -33,7 +20,7 @@ _HEADROOM = 2.5  # the axis ends at this times the highest curve, even if a band
 _VISITED = "range of the training samples"
 
 
-def law_sheets(picture: FitPicture) -> Iterator[Sheet]:
+def law_sheets(picture: FitPicture) -> Iterator[draw.Sheet]:
     """Show the friction laws of a fit."""
     desk = _Desk(picture)
     pairs = list(zip(effects(picture.start.data), effects(picture.fitted.data), strict=True))
@@ -43,7 +30,7 @@ def law_sheets(picture: FitPicture) -> Iterator[Sheet]:
     for tendon in sorted({fitted.tendon for _, fitted in drawn}):
         here = [(start, fitted) for start, fitted in drawn if fitted.tendon == tendon]
         name = picture.fitted.tendon_names[tendon - 1] if tendon else ""
-        yield Sheet(
+        yield draw.Sheet(
             "laws",
             f"laws_tendon_{tendon}" if tendon else "laws_joints",
             f"Tendon {tendon}: {name}" if tendon else "In the joints",
@@ -102,7 +89,7 @@ class _Desk:
     def __init__(self, picture: FitPicture) -> None:
         self._picture, self._bands, self._motion = picture, LawBands(picture), _Motion(picture)
 
-    def panel(self, start: Effect, fitted: Effect) -> Panel:
+    def panel(self, start: Effect, fitted: Effect) -> draw.Panel:
         return self._over_angle(start, fitted) if fitted.angles else self._over_speed(start, fitted)
 
     def _title(self, effect: Effect) -> str:
@@ -111,11 +98,11 @@ class _Desk:
             return joint if effect.kind == "friction" else f"{joint}, load"
         return f"{'pulley' if effect.kind == 'pulley_friction' else 'edge'} {effect.joint} ({joint})"
 
-    def _fitted(self, effect: Effect, x: Numbers, y: Numbers) -> Trace:
+    def _fitted(self, effect: Effect, x: Numbers, y: Numbers) -> draw.Trace:
         """Draw a fitted law: grey where nothing tells its Coulomb friction."""
         if not is_known(effect, self._picture):
-            return curve(x, y, "not identified", GREY, 1.8)
-        return curve(x, y, "fitted, over the angle at the median speed" if effect.angles else "fitted", BLUE, 1.8)
+            return curve(x, y, "not identified", draw.GREY, 1.8)
+        return curve(x, y, "fitted, over the angle at the median speed" if effect.angles else "fitted", draw.BLUE, 1.8)
 
     def _note(self, effect: Effect) -> str:
         numbers = numbers_of(effect, self._picture.report)
@@ -123,7 +110,7 @@ class _Desk:
             f"{sum(bool(entry['identified']) for entry in numbers)}/{len(numbers)} identified" if numbers else "fixed"
         )
 
-    def _over_speed(self, start: Effect, fitted: Effect) -> Panel:
+    def _over_speed(self, start: Effect, fitted: Effect) -> draw.Panel:
         """Show both directions as in fig. 2b: 0 below v_min."""
         threshold = velocity_threshold(self._picture.fitted.data, fitted)
         sliding, _ = self._motion.sliding(fitted)
@@ -145,23 +132,23 @@ class _Desk:
         limit = unit * fastest
         still_name = "below v_min: no friction is modelled, the bias replaces it"
         rest = [(-unit * threshold, unit * threshold)] if threshold else []
-        return panel(
+        return draw.panel(
             self._title(fitted),
             f"{self._title(fitted)}: {y_label} over {x_label}: fitted {ends[0]:.3g} where sliding "
             f"begins, {ends[1]:.3g} at {limit:.3g}; {self._note(fitted)}.",
             x_label,
             y_label,
-            histogram(unit * sliding, -limit, limit, _VISITED),
-            band(x, both("high", "low"), both("low", "high"), "95 % confidence"),
-            curve(x, both("start", "start"), "start", GREY, 1.1, "dash"),
+            draw.histogram(unit * sliding, -limit, limit, _VISITED),
+            draw.band(x, both("high", "low"), both("low", "high"), "95 % confidence"),
+            curve(x, both("start", "start"), "start", draw.GREY, 1.1, "dash"),
             self._fitted(fitted, x, both("fitted", "fitted")),
-            stripes(rest, still_name, SILVER, 0.35),
+            draw.stripes(rest, still_name, draw.SILVER, 0.35),
             note=self._note(fitted),
             x_limits=(-limit, limit),
             y_limits=(-top, top),
         )
 
-    def _over_angle(self, start: Effect, fitted: Effect) -> Panel:
+    def _over_angle(self, start: Effect, fitted: Effect) -> draw.Panel:
         """Show a law at two speeds, or both directions at one speed where they differ."""
         threshold = velocity_threshold(self._picture.fitted.data, fitted)
         sliding, visited = self._motion.sliding(fitted)
@@ -173,23 +160,23 @@ class _Desk:
             drawn = [("negative", -1, median), ("fitted", 1, median)]
         laws = [self._bands.over_angle(start, fitted, sign, speed, angle) for _, sign, speed in drawn]
         factor, y_label = _unit(fitted, laws)
-        traces: list[Trace] = histogram(visited, float(angle[0]), float(angle[-1]), _VISITED)
+        traces: list[draw.Trace] = draw.histogram(visited, float(angle[0]), float(angle[-1]), _VISITED)
         for (style, _, _), law in zip(drawn, laws, strict=True):
             ends = factor * law.low, factor * law.high
             if style == "slow":
-                traces += [curve(angle, end, "its 95 %", ORANGE, 0.9, "dot") for end in ends]
+                traces += [curve(angle, end, "its 95 %", draw.ORANGE, 0.9, "dot") for end in ends]
             elif style == "negative":
-                traces += band(angle, *ends, "", VERMILION, 0.18)
+                traces += draw.band(angle, *ends, "", draw.VERMILION, 0.18)
             else:
-                traces += band(angle, *ends, "95 % confidence")
-            traces.append(curve(angle, factor * law.start, "start", GREY, 1.1, "dash"))
+                traces += draw.band(angle, *ends, "95 % confidence")
+            traces.append(curve(angle, factor * law.start, "start", draw.GREY, 1.1, "dash"))
         for (style, _, _), law in zip(drawn, laws, strict=True):
             y = factor * law.fitted
-            lines = {"slow": ("at v_min", ORANGE), "negative": ("negative direction", VERMILION)}
+            lines = {"slow": ("at v_min", draw.ORANGE), "negative": ("negative direction", draw.VERMILION)}
             traces.append(self._fitted(fitted, angle, y) if style == "fitted" else curve(angle, y, *lines[style], 1.8))
         before = self._picture.fitted.joint_names[fitted.joint - 2] if fitted.joint > 1 else ""
         lowest, highest = factor * laws[-1].fitted.min(), factor * laws[-1].fitted.max()
-        return panel(
+        return draw.panel(
             self._title(fitted),
             f"{self._title(fitted)}: {y_label} over the angle of {before or 'the base'}, {len(fitted.angles)} "
             f"working points: fitted {lowest:.3g} to {highest:.3g}; {self._note(fitted)}.",

@@ -9,18 +9,8 @@ from typing import Any
 from tendonfmu.estimate import FitPicture, verdicts
 from tendonfmu.files import write_text
 from tendonfmu.model import part_of
+from tendonfmu.report import fit_text as text
 from tendonfmu.report.fit_figures import fit_sheets, strongest_pairs
-from tendonfmu.report.fit_text import (
-    RESIDUAL_HEADINGS,
-    ResidualTable,
-    apart,
-    consistency,
-    page_tables,
-    range_of,
-    residual_tables,
-    state_of,
-    summary_sentences,
-)
 from tendonfmu.report.numbers import Row, percent, unit_text
 from tendonfmu.report.page import Tile, make_folder, render
 
@@ -40,21 +30,21 @@ def write_fit_page(picture: FitPicture, folder: Path) -> dict[Path, str]:
 def fit_page(picture: FitPicture) -> str:
     """Return the HTML text of the page of a fit."""
     report, joints = picture.report, picture.fitted.joint_names
-    tables = residual_tables(report, joints)
+    tables = text.residual_tables(report, joints)
     return render(
         "fit.html.jinja",
         fit_sheets(picture),
         report=report,
-        state=state_of(report),
+        state=text.state_of(report),
         tiles_shown=_tiles(report, tables),
-        sentences=list(summary_sentences(picture, tables)),
+        sentences=list(text.summary_sentences(picture, tables)),
         joint_names=joints,
         residuals=[
             (f"{each.title}: rms in {each.unit}", [(row.name, *row.texts) for row in each.rows])
-            for each in page_tables(tables, joints)
+            for each in text.page_tables(tables, joints)
         ],
-        residual_headings=RESIDUAL_HEADINGS,
-        consistency=list(consistency(picture)),
+        residual_headings=text.RESIDUAL_HEADINGS,
+        consistency=list(text.consistency(picture)),
         doubts=list(_doubts(report)),
         pairs=[
             (f"{pair.correlation:+.3f}".replace("-", "−"), pair.first, pair.second)
@@ -66,15 +56,15 @@ def fit_page(picture: FitPicture) -> str:
     )
 
 
-def _tiles(report: Entry, tables: Sequence[ResidualTable]) -> list[Tile]:
-    few, many = apart(tables)
+def _tiles(report: Entry, tables: Sequence[text.ResidualTable]) -> list[Tile]:
+    few, many = text.apart(tables)
     tiles = [
         Tile(percent(table.all.left), "", f"of the torque is left: {table.title[0].lower() + table.title[1:]}")
         for table in few
         if table.all.left is not None
     ]
     if many:
-        tiles.append(Tile(range_of(many), "", f"of the torque is left in {len(many)} recordings not trained on"))
+        tiles.append(Tile(text.range_of(many), "", f"of the torque is left in {len(many)} recordings not trained on"))
     bias = tables[0].all.share(tables[0].all.bias_only) if tables else None
     if bias is not None:
         tiles.append(Tile(percent(bias), "", "would be left by the bias alone"))

@@ -9,21 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.drawing import (
-    BLUE,
-    DARK,
-    ORANGE,
-    SKY,
-    VERMILION,
-    Interval,
-    Panel,
-    Sheet,
-    band,
-    curve,
-    lane,
-    panel,
-    stripes,
-)
+from tendonfmu import drawing as draw
 from tendonfmu.files import check_output, check_output_folder, counted, write_text
 from tendonfmu.model import Finger
 from tendonfmu.recordings import flagged_stretches
@@ -126,55 +112,55 @@ def _joint_row(joint: Mapping[str, Any]) -> Row:
 
 def run_sheets(
     table: Table, joints: Sequence[str], tendons: Sequence[str], label: NDArray[Any] | None = None
-) -> Iterator[Sheet]:
+) -> Iterator[draw.Sheet]:
     """Yield the figures of a run."""
     # table: [N]
     torques = (table[f"joint_torque[{j}]"] for j in range(1, len(joints) + 1))
     factor, unit = torque_unit(max(float(np.abs(torque).max()) for torque in torques), 1.0)
     for j, name in enumerate(joints, start=1):
-        yield Sheet("joints", f"joint_{j}", name, list(_torque_panels(table, j, name, factor, unit)))
+        yield draw.Sheet("joints", f"joint_{j}", name, list(_torque_panels(table, j, name, factor, unit)))
     yield _events_sheet(table, joints, tendons, label)
     motion = [
-        panel(
+        draw.panel(
             f"{name}: {key}",
             f"Joint {key} of {name} over time",
             _TIME,
             f"{key} ({unit})",
-            curve(table["time"], table[f"joint_{key}[{j}]"], key, colour, 1.8),
+            draw.curve(table["time"], table[f"joint_{key}[{j}]"], key, colour, 1.8),
             zoom=ZOOM,
         )
-        for key, colour, unit in (("angle", BLUE, "rad"), ("speed", ORANGE, "rad/s"))
+        for key, colour, unit in (("angle", draw.BLUE, "rad"), ("speed", draw.ORANGE, "rad/s"))
         for j, name in enumerate(joints, start=1)
     ]
-    yield Sheet("motion", "motion", "Joint angles and speeds", motion, folded=True)
+    yield draw.Sheet("motion", "motion", "Joint angles and speeds", motion, folded=True)
 
 
-def _torque_panels(table: Table, j: int, name: str, factor: float, unit: str) -> Iterator[Panel]:
+def _torque_panels(table: Table, j: int, name: str, factor: float, unit: str) -> Iterator[draw.Panel]:
     time = table["time"]
     torque, friction, left, std = (
         factor * np.asarray(table[f"{key}[{j}]"], dtype=np.float64)
         for key in ("joint_torque", "friction_torque", "compensated_torque", "compensated_torque_std")
     )
-    contact = stripes(flagged_stretches(time, table[f"joint_contact[{j}]"]), "contact", VERMILION, 0.16)
-    yield panel(
+    contact = draw.stripes(flagged_stretches(time, table[f"joint_contact[{j}]"]), "contact", draw.VERMILION, 0.16)
+    yield draw.panel(
         "Torque and friction",
         f"Joint torque of {name} and its friction torque over time",
         _TIME,
         f"torque ({unit})",
-        curve(time, torque, "joint torque", DARK, 1.0),
-        curve(time, friction, "friction torque", SKY, 1.5),
+        draw.curve(time, torque, "joint torque", draw.DARK, 1.0),
+        draw.curve(time, friction, "friction torque", draw.SKY, 1.5),
         contact,
         note=f"{rms(torque):.3g} {unit} rms",
         size="medium",
         zoom=ZOOM,
     )
-    yield panel(
+    yield draw.panel(
         "Compensated torque",
         f"Compensated torque of {name} over time, and when contact was detected there",
         _TIME,
         f"torque ({unit})",
-        band(*_thinned_band(time, left - std, left + std), "± one standard deviation") if std.any() else [],
-        curve(time, left, "compensated torque", BLUE, 1.0),
+        draw.band(*_thinned_band(time, left - std, left + std), "± one standard deviation") if std.any() else [],
+        draw.curve(time, left, "compensated torque", draw.BLUE, 1.0),
         contact,
         note=f"{rms(left):.3g} {unit} rms",
         size="medium",
@@ -193,30 +179,32 @@ def _thinned_band(
     return time[middles], np.minimum.reduceat(low, begins), np.maximum.reduceat(high, begins)
 
 
-def _events_sheet(table: Table, joints: Sequence[str], tendons: Sequence[str], label: NDArray[Any] | None) -> Sheet:
+def _events_sheet(
+    table: Table, joints: Sequence[str], tendons: Sequence[str], label: NDArray[Any] | None
+) -> draw.Sheet:
     time = table["time"]
-    rows: list[tuple[str, str, str, list[Interval]]] = []  # name, meaning, colour, stretches
+    rows: list[tuple[str, str, str, list[draw.Interval]]] = []  # name, meaning, colour, stretches
     if label is not None:
-        rows.append(("labelled contact", "contact as labelled", DARK, flagged_stretches(time, label)))
+        rows.append(("labelled contact", "contact as labelled", draw.DARK, flagged_stretches(time, label)))
     for j, name in enumerate(joints, start=1):
         found = flagged_stretches(time, table[f"joint_contact[{j}]"])
-        rows.append((f"contact, {name}", "contact as detected", VERMILION, found))
+        rows.append((f"contact, {name}", "contact as detected", draw.VERMILION, found))
     for i, name in enumerate(tendons, start=1):
         if slack := flagged_stretches(time, table[f"slack[{i}]"]):
-            rows.append((f"slack, {name}", "tendon slack", ORANGE, slack))
-    shown = panel(
+            rows.append((f"slack, {name}", "tendon slack", draw.ORANGE, slack))
+    shown = draw.panel(
         "Over time",
         "When contact was detected at each joint, and when a tendon was slack",
         _TIME,
         "",
-        *(lane(row[3], k, row[1], row[2], 7.0) for k, row in enumerate(rows) if row[3]),
+        *(draw.lane(row[3], k, row[1], row[2], 7.0) for k, row in enumerate(rows) if row[3]),
         size="large" if len(rows) > 8 else "medium",
         rows=[row[0] for row in rows],
         x_limits=(float(time[0]), float(time[-1])) if time[-1] > time[0] else None,
         zoom=ZOOM,
     )
     none = "" if shown.traces else "No contact was detected, and no tendon was slack."
-    return Sheet("events", "events", "Contact and slack", [shown] if shown.traces else [], none)
+    return draw.Sheet("events", "events", "Contact and slack", [shown] if shown.traces else [], none)
 
 
 # --- the numbers ------------------------------------------------------------------------------------------------------

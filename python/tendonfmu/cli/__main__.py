@@ -1,5 +1,0 @@
-"""Run `python -m tendonfmu.cli` as the command `tendonfmu`."""
-
-from tendonfmu.cli.program import main
-
-main()
