@@ -234,12 +234,18 @@ def keywords(
             ours.append(inspect.Parameter(each.name, by_name, default=each.default, annotation=each.type))
             listed += f"    {each.name}\n        {each.metadata['option'].sentence(each.default)}\n"
 
+        signature = inspect.Signature([*sources, *ours])
+
         @functools.wraps(function)
         def call(*given: Any, **named: Any) -> Result:
-            by_name = {each.name: named.pop(each.name) for each in sources[len(given) :] if each.name in named}
-            return function(*given, **by_name, options=known(**named))
+            try:
+                taken = signature.bind(*given, **named).arguments
+            except TypeError as wrong:
+                raise TypeError(f"{function.__name__}() {wrong}") from None
+            by_name = {each.name: taken.pop(each.name) for each in sources if each.name in taken}
+            return function(**by_name, options=known(**taken))
 
-        call.__signature__ = inspect.Signature([*sources, *ours])  # type: ignore[attr-defined]
+        call.__signature__ = signature  # type: ignore[attr-defined]
         call.__doc__ = (function.__doc__ or "").replace("\n    Returns\n", f"{listed}\n    Returns\n", 1)
         return call
 

@@ -193,3 +193,10 @@ def test_names_are_escaped_where_results_are_shown() -> None:
         assert "<script>" not in page and "&lt;script&gt;" in page
     for figure in (recording.plot(), diagnosis.plot()):
         assert "<script>" not in figure.layout.title.text and len(figure.data) > 3
+
+
+def test_a_wrong_argument_names_the_function() -> None:
+    with pytest.raises(TypeError, match=r"^fit\(\) got an unexpected keyword argument 'hold_out'"):
+        tf.fit("finger.json", [], hold_out=0.2)  # type: ignore[call-arg]
+    with pytest.raises(TypeError, match=r"^score\(\) missing a required argument: 'recordings'"):
+        tf.score("finger.json")  # type: ignore[call-arg]
