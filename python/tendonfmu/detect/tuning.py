@@ -182,10 +182,8 @@ class ContactTuning(Configured):
     ----------
     finger
         Description: its file, parsed JSON, or the result of `read_finger`.
-    progress
-        Called with steps done and steps.
     **options
-        The options of `tendonfmu.tune`, with the same names and defaults.
+        The options of `tendonfmu.tune`, `progress` among them, with the same names and defaults.
 
     Attributes
     ----------
