@@ -228,17 +228,17 @@ def plant_table(figures: Figures) -> str:
 PARTS = {
     "steps": Part(
         steps,
-        headlines={"avx2/4x8x5": (0.0, 400.0), "avx2/presliding": (0.0, 1000.0)},
+        headlines={"avx2/4x8x5": (0.0, 1500.0), "avx2/presliding": (0.0, 4000.0)},
         tables={"steps": time_table(STEPS, "what")},
     ),
     "worst": Part(
         worst,
-        headlines={"shaking.1": (0.0, 3000.0)},
+        headlines={"shaking.1": (0.0, 9000.0)},
         tables={"million": slow_table},
     ),
     "fmu_steps": Part(
         fmu_steps,
-        headlines={"fmi2": (0.0, 600.0)},
+        headlines={"fmi2": (0.0, 2000.0)},
         tables={"steps": time_table(WAYS, "a step by the")},
     ),
     "plant": Part(
