@@ -1,6 +1,6 @@
-/* Doubles side by side, as many as the source asks for by TENDONFMU_QUAD_LANES: vector types of GCC and Clang, with C's
- * operators lane by lane. Without it, and with other compilers, a quad is one double, whose bits all others give.
- * Masks are joined by & | ^; a mask after ~ is good for & alone. */
+/* Doubles side by side, as many as the source asks for by TENDONFMU_QUAD_LANES (TENDONFMU_QUAD_AVX2: by its
+ * instructions): vector types of GCC and Clang, with C's operators lane by lane. Without it, and with other compilers,
+ * a quad is one double, whose bits all others give. Masks are joined by & | ^; a mask after ~ is good for & alone. */
 #pragma once
 
 #include <math.h>
