@@ -86,6 +86,14 @@ def test_commands_and_temperatures_are_no_signals(tmp_path: Path) -> None:
     assert set(lines) == {"time", "tendon_force[1]", "tendon_position[1]"}
 
 
+def test_numbered_motors_turn_spools(tmp_path: Path) -> None:
+    columns = {"time": T, "force_1": FORCE, "m1_pos_deg": np.degrees(ANGLE), "m1_cur_mA": 30 * FORCE}
+    lines = proposed(tmp_path, columns)
+    assert set(lines) == {"time", "tendon_force[1]", "tendon_position[1]"}
+    assert lines["tendon_position[1]"].source == "m1_pos_deg"
+    assert "radius of the spool" in lines["tendon_position[1]"].why
+
+
 def test_a_servo_becomes_one_joint(call: Call, tmp_path: Path) -> None:
     columns = {"t": T, "torque [mN.m]": 800 * np.sign(np.cos(3 * T)), "angle [deg]": np.degrees(ANGLE)}
     proposed(tmp_path, columns, "servo 3.csv")

@@ -74,6 +74,19 @@ READ: dict[str, str] = {
 }
 
 
+CHANNELS = dict(zip(("force [mN]", "spool [mm]"), (1, 2), strict=True))
+ROW_BY_ROW = [[row[0], name, row[k]] for row in CELLS for name, k in CHANNELS.items()]
+ONE_BY_ONE = [[row[0], name, row[k]] for name, k in CHANNELS.items() for row in CELLS]
+READ["a channel a row"] = joined([["time", "channel", "value"], *ROW_BY_ROW])
+READ["one channel after the other"] = joined([["time", "channel", "value"], *ONE_BY_ONE])
+READ["InfluxDB"] = "#group,false,false,true\n#default,_result,,,,\n" + joined(
+    [
+        ["", "result", "table", "_time", "_value", "_field", "_measurement"],
+        *(["", "", str(name != "force [mN]"), time, value, name, "hand"] for time, name, value in ONE_BY_ONE),
+    ]
+)
+
+
 def inspected(folder: Path, text: str, name: str = "log.csv") -> Inspection:
     (folder / name).write_bytes(text.encode())
     return inspect_log(folder / name)
@@ -145,6 +158,31 @@ def test_names_in_each_cell_are_refused(tmp_path: Path, pair: str) -> None:
 def test_decimal_commas_between_commas_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"3 names and 6 fields in a row between commas.*decimal points"):
         inspected(tmp_path, joined([PLAIN]) + joined(CELLS).replace(".", "\0").replace("\0", ","))
+
+
+@pytest.mark.parametrize(
+    "cell", ["[{0}, {1}]", "({0}, {1})", "[{0}  {1}]", "array([{0}, {1}], dtype=float32)", "[np.float64({0}), {1}]"]
+)
+def test_a_list_in_a_cell_has_a_field_for_each_number(tmp_path: Path, cell: str) -> None:
+    rows = [[time, f'"{cell.format(force, spool)}"'] for time, force, spool in CELLS]
+    inspection = inspected(tmp_path, joined([["time", "force"], *rows]))
+    names = [summary.field.name for summary in inspection.topics[0].fields]
+    assert names == ["time", "force[1]", "force[2]"]
+    force = inspection.topics[0].fields[1]
+    assert (force.low, force.high) == (pytest.approx(FORCE.min()), pytest.approx(FORCE.max()))
+
+
+def test_a_number_in_parentheses_is_no_list(tmp_path: Path) -> None:
+    """Accountants write negative numbers so."""
+    inspection = inspected(tmp_path, joined([["time", "force"], *([time, f"({force})"] for time, force, _ in CELLS)]))
+    assert [summary.field.kind for summary in inspection.topics[0].fields] == ["number", "text"]
+
+
+@pytest.mark.parametrize("digits", [4, 2], ids=["times rise", "a coarse clock"])
+def test_a_text_beside_a_number_makes_no_channels(tmp_path: Path, digits: int) -> None:
+    rows = [[f"{t:.{digits}f}", "home" if t < 0.3 else "move", row[1]] for t, row in zip(T, CELLS, strict=True)]
+    inspection = inspected(tmp_path, joined([["time", "state", "force"], *rows]))
+    assert len(inspection.topics) == 1
 
 
 def test_numbers_as_names_are_no_row(tmp_path: Path) -> None:

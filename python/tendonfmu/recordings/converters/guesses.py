@@ -195,6 +195,7 @@ REFERENCE = {"external", "ext", "reference", "ref", "ft", "sensor"}
 CONTACT = {"contact", "touch", "label", "touching"}
 # words that say that a signal is not measured, or no signal of a finger
 OTHERS = {"desired", "des", "target", "command", "cmd", "setpoint", "goal", "temperature", "temp", "current", "voltage"}
+OTHERS |= {"cur", "curr", "amp", "amps", "ma", "volt", "volts", "duty"}
 OTHERS |= {"action", "pwm", "error", "imu", "acceleration", "acc", "covariance", "seq", "status", "mode"}
 # parts of a message that say how it is built
 STRUCTURE = {"layout", "header", "seq", "dim", "data_offset", "stride", "size", "frame_index", "episode_index"}
@@ -271,6 +272,7 @@ def words_of(name: str) -> list[str]:
     """Return the words of a name in lower case: `TendonForce_2` is tendon, force."""
     plain = name if _array_of(name) else re.sub(r"[\[(].*?[\])]", " ", name)
     apart = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", plain)
+    apart = re.sub(r"(?<![A-Za-z])([Mm]|[Mm]ot)(?=_?\d)", "motor", apart)  # m1_pos
     return [word.lower() for word in re.findall(r"[A-Za-z]+", apart)]
 
 

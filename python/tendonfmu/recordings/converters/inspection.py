@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
+from tendonfmu.recordings.converters.channel_rows import ChannelRows
 from tendonfmu.recordings.converters.column_map import LogFormat, MappedColumn
 from tendonfmu.recordings.converters.log import (
     NUMBER,
@@ -270,7 +271,8 @@ def _as_times(log: Log, clock: ClockSummary, texts: Any) -> NDArray[np.int64] | 
 
 def _settings(log: Log) -> dict[str, Any]:
     """Return what was found in the first lines, so that `convert table` reads the log in the same way."""
-    log = log.log if isinstance(log, SplitStamps) else log
+    while isinstance(log, SplitStamps | ChannelRows):
+        log = log.log
     if not isinstance(log, TextLog):
         return {}
     layout = log.layout

@@ -111,7 +111,9 @@ def _rank(field: Field, prefix: str) -> int | None:
     if field.type == DATE_TIME:
         return 0
     # without a unit: "Time [s]", "t_ms"
-    plain = re.sub(r"[_ ]*(\[.*\]|\(.*\)|_(s|sec|ms|msec|us|usec|ns|nsec))$", "", name.removeprefix(prefix.lower()))
+    plain = re.sub(
+        r"[_ ]*(\[.*\]|\(.*\)|_(s|sec|ms|msec|us|usec|ns|nsec))$", "", name.removeprefix(prefix.lower())
+    ).lstrip("_")
     if plain in TIME_NAMES:
         return TIME_NAMES.index(plain)
     last = re.split(r"[/.]", re.sub(r"[\[(].*$", "", name))[-1]
@@ -153,7 +155,9 @@ def open_log(file: Path, settings: LogFormat) -> Log:
     opener = getattr(importlib.import_module(f"tendonfmu.recordings.converters.{module}"), name)
     log = cast("Log", opener(file, settings))
     split = SplitStamps(log)
-    return cast("Log", split) if split.topics != log.topics else log
+    log = cast("Log", split) if split.topics != log.topics else log
+    rows = importlib.import_module("tendonfmu.recordings.converters.channel_rows")
+    return cast("Log", rows.by_channel(log))
 
 
 def find_field(log: Log, source: str | int, where: str) -> tuple[Topic, str]:

@@ -72,9 +72,19 @@ def _find_encoding(file: Path, begin: bytes, wanted: str | None) -> tuple[str, s
     return "utf-8", ""
 
 
+# [1.0, 2.0], [1. 2.], (1.0, 2.0) or array([1.0, 2.0], dtype=float32)
+_LIST = re.compile(r"(?:[\w.]+\()?(?:\[([^\[\]]*)\]|\(([^()]*,[^()]*)\))(?:, *[a-z]+=[\w.]+)*\)?")
+
+
+def _listed(cell: str) -> list[str]:
+    """Return the numbers of a cell that holds them as a list; none if it is no list."""
+    found = _LIST.fullmatch(re.sub(r"np\.\w+\(([^()]*)\)", r"\1", cell.strip()))  # np.float64(1.0)
+    return re.findall(r"[^\s,]+", found[1] or found[2] or "") if found else []
+
+
 def _length_of_lists(cells: Sequence[str]) -> int:
-    """Return how many numbers each cell holds as a list, [1.0, 2.0]; 0 if they are no such lists."""
-    if not cells or not all(cell.startswith("[") and cell.endswith("]") for cell in cells):
+    """Return how many numbers each cell holds as a list; 0 if they are no lists."""
+    if not cells or not all(map(_listed, cells)):
         return 0
     numbers = _numbers_of_lists(cells)
     return 0 if numbers is None or numbers.shape[1] > LONGEST else int(numbers.shape[1])
@@ -83,7 +93,7 @@ def _length_of_lists(cells: Sequence[str]) -> int:
 def _numbers_of_lists(cells: Sequence[str | None]) -> Any:
     """Return the numbers [N, k] of N lists, or None if they are not equally long."""
     try:
-        return np.array([cell.strip(" []").split(",") for cell in cells if cell is not None], dtype=np.float64)
+        return np.array([_listed(cell) for cell in cells if cell is not None], dtype=np.float64)
     except ValueError:
         return None
 
@@ -376,7 +386,7 @@ class TextLog:
         for name, (place, number) in places.items():
             cell = fields[place]
             if number is not None:
-                numbers = cell.strip("[]").split(",")
+                numbers = _listed(cell)
                 if number >= len(numbers):
                     found = counted(len(numbers), "number")
                     return f"column {layout.names[place]}, \0{found}; expected as many as in the first row"
