@@ -21,6 +21,7 @@ namespace nb = nanobind;
 using number_rows = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 using number_row = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using flag_row = nb::ndarray<const unsigned char, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using flag_rows = nb::ndarray<const unsigned char, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 
 // Values as a numpy array of this shape; empty: of one dimension.
 template <typename Value>

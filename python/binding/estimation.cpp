@@ -149,12 +149,18 @@ void bind_estimator(nb::module_& m) {
           [](estimator& all, const number_row& time, const number_rows& force,
              const std::optional<number_rows>& position, const std::optional<number_rows>& angle,
              const std::optional<number_rows>& velocity, int source, const std::optional<number_rows>& external,
-             const std::optional<flag_row>& use) {
-            return all.add_recording(recording_of(all, time, force, position, angle, velocity, source, external, use));
+             const std::optional<flag_row>& use, const std::optional<flag_rows>& silent) {
+            recording_arrays added = recording_of(all, time, force, position, angle, velocity, source, external, use);
+            if (silent && (silent->shape(0) != added.samples || silent->shape(1) != all.joint_count())) {
+              throw nb::value_error("silent: expected one flag a sample and joint");
+            }
+            added.silent = silent ? silent->data() : nullptr;
+            return all.add_recording(added);
           },
           nb::arg("time"), nb::arg("tendon_force"), nb::arg("tendon_position") = nb::none(),
           nb::arg("joint_position") = nb::none(), nb::arg("joint_velocity") = nb::none(),
-          nb::arg("kinematics_source") = 1, nb::arg("external_torque") = nb::none(), nb::arg("use") = nb::none())
+          nb::arg("kinematics_source") = 1, nb::arg("external_torque") = nb::none(), nb::arg("use") = nb::none(),
+          nb::arg("silent") = nb::none())
       .def(
           "set_weights",
           [](estimator& all, std::size_t recording, const number_row& weight) {
@@ -193,8 +199,9 @@ void bind_estimator(nb::module_& m) {
       .def("innovations",
            [](const estimator& all, std::size_t recording, const number_row& z) {
              estimator::residuals r = all.innovations(recording, copied(z));
-             const std::size_t samples = r.variance.size(), n = all.joint_count();
-             return nb::make_tuple(as_array(std::move(r.innovation), {samples, n}), as_array(std::move(r.variance)),
+             const std::size_t n = all.joint_count(), samples = r.variance.size() / n;
+             return nb::make_tuple(as_array(std::move(r.innovation), {samples, n}),
+                                   as_array(std::move(r.variance), {samples, n}),
                                    as_array(std::move(r.bias), {samples, n}));
            })
       .def("fit", &fit, nb::arg("start"), nb::arg("prior_std"), nb::arg("tolerance"), nb::arg("passes"),

@@ -193,9 +193,7 @@ def normalised_errors(seed: int) -> tuple[Array, Array]:
     result = estimator.fit(prior_std=3.0)
     assert result.converged
     e, S, _ = estimator.innovations(0, result.z)
-    return ((result.z - truth.start) / np.sqrt(np.diag(result.covariance)))[identified], (
-        e[1:] ** 2 / S[1:, None]
-    ).ravel()
+    return ((result.z - truth.start) / np.sqrt(np.diag(result.covariance)))[identified], (e[1:] ** 2 / S[1:]).ravel()
 
 
 def test_standard_errors_are_honest() -> None:

@@ -126,6 +126,54 @@ def test_a_finger_with_tendons_and_a_learning_bias(bias: dict[str, Any], share: 
     assert (found["coulomb"], found["viscous"]) == pytest.approx((servo.COULOMB, servo.VISCOUS), rel=0.05)
 
 
+def two_joint_arm(bias: dict[str, Any]) -> tuple[pd.DataFrame, dict[str, Any]]:
+    """Two drives that move by turns of 4 s; the one that rests is held with any torque up to Coulomb friction."""
+    random = np.random.default_rng(31)
+    time = np.arange(0.0, 80.0, 0.002)
+    columns: dict[str, Any] = {"time": time}
+    for j in (1, 2):
+        turn, phase = time // 4.0, time % 4.0 / 4.0
+        velocity = np.where(turn % 2 == j - 1, 3.0 * np.sin(4 * np.pi * phase) * np.sin(np.pi * phase) ** 2, 0.0)
+        held = random.uniform(-0.9, 0.9, 20)[turn.astype(int)] * servo.COULOMB
+        torque = np.where(velocity == 0.0, held, servo.COULOMB * np.sign(velocity) + servo.VISCOUS * velocity)
+        angle = np.cumsum(velocity) * 0.002
+        columns |= {f"tendon_force[{j}]": torque + random.normal(0.0, NOISE, len(time))}
+        columns |= {f"tendon_position[{j}]": angle, f"joint_position[{j}]": angle, f"joint_velocity[{j}]": velocity}
+    law = {"static": 0.1, "coulomb": 0.1, "stribeck_velocity": 0.05, "viscous": 0.02}
+    finger = {
+        "format": "tendonfmu-finger-1",
+        "name": "arm",
+        "joints": [{"name": name, "friction": law} for name in ("shoulder", "elbow")],
+        "tendons": [{"stiffness": 1e9, "bidirectional": True, "moment_arms": row} for row in np.eye(2).tolist()],
+        "contact": {"threshold": [1.0, 1.0]},
+        "velocity_threshold": {"joint": 0.01, "tendon": 0.01},
+        "bias": bias,
+    }
+    return pd.DataFrame(columns), finger
+
+
+NOISE = 0.01  # N·m
+CONSTANT = {
+    "drift_variance": 0.0,
+    "initial_variance": 0.0,
+    "forget_rate": 0.0,
+    "noise_std": 0.02,
+    "initial_torque": [0.0, 0.0],
+}
+
+
+@pytest.mark.parametrize("bias", [CONSTANT, {}], ids=["constant bias", "learning bias"])
+def test_a_joint_that_rests_while_another_moves_says_nothing(bias: dict[str, Any]) -> None:
+    """Samples at rest of a joint count for none, as if they were left out of its own equation alone."""
+    table, finger = two_joint_arm(bias)
+    fit = FrictionFit(finger, kinematics=3, threads=1).fit(table)
+    for j in (1, 2):
+        found = fit.parameters_[f"joints[{j}].friction.coulomb"], fit.parameters_[f"joints[{j}].friction.viscous"]
+        assert found == pytest.approx((servo.COULOMB, servo.VISCOUS), rel=0.05)
+    if bias:
+        assert fit.report_["residual"]["train"]["rms"] == pytest.approx([NOISE, NOISE], rel=0.1)
+
+
 def test_diagnose_learns_nothing_from_a_motor_that_holds(tmp_path: Path) -> None:
     """Kept, rests look like friction that builds up gradually and then decays."""
     log, columns = written(tmp_path, servo.servo_log(17, duration=40.0))
@@ -159,7 +207,7 @@ def test_a_machine_without_tendons_gets_no_advice_about_pretension(tmp_path: Pat
 def test_at_rest_means_that_no_friction_slides() -> None:
     data = describe_joint_of(0.02)
     speed = np.array([[0.0], [0.02], [-0.02], [0.021], [-0.021]])
-    assert left_at_rest(data, speed).tolist() == [True, True, True, False, False]
+    assert left_at_rest(data, speed).ravel().tolist() == [True, True, True, False, False]
 
 
 def describe_joint_of(threshold: float) -> dict[str, Any]:

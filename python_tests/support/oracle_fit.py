@@ -155,14 +155,16 @@ class Likelihood:
         kinematics_source: int = 1,
         external_torque: Array | None = None,
         use: Array | None = None,
+        silent: Array | None = None,
     ) -> None:
         self.trace = Trace(description, recording, kinematics_source)
         self.unknowns = unknowns
         self.y = self.trace.tau - (0.0 if external_torque is None else np.asarray(external_torque))
-        self.use = np.ones(len(self.y), dtype=bool) if use is None else np.asarray(use, dtype=bool)
+        self.use = np.ones(self.y.shape, dtype=bool) if silent is None else ~np.asarray(silent, dtype=bool)
+        self.use &= True if use is None else np.asarray(use, dtype=bool)[:, None]
         bias = given(description, "bias", {})
         self.given_start = given(bias, "initial_torque", None) is not None
-        self.first = 0 if self.given_start else int(np.argmax(self.use))
+        self.first = 0 if self.given_start else int(np.argmax(self.use.all(axis=1)))
         self.drift = float(given(bias, "drift_variance", 1e-6))
         mean_force = np.abs(self.trace.force).mean(axis=1)
         plain = (
@@ -174,9 +176,9 @@ class Likelihood:
         if given(bias, "noise_time", None) is not None:
             self.noise = plain * float(bias["noise_time"]) / np.diff(self.trace.time, prepend=np.nan)
 
-    def rows(self) -> Array:
-        """Indices of the samples in the likelihood: used, and after the one that starts the bias."""
-        return np.flatnonzero(self.use & (np.arange(len(self.use)) > self.first))
+    def rows(self, joint: int = 0) -> Array:
+        """Indices of a joint's samples in the likelihood: used, and after the one that starts the bias."""
+        return np.flatnonzero(self.use[:, joint] & (np.arange(len(self.use)) > self.first))
 
     def covariance(self, rows: Array) -> Array:
         """[K, K] of y − T − Σ Δb − b_first at given samples."""
@@ -202,25 +204,28 @@ class Likelihood:
         return left, slope
 
     def whitened(self, z: Array) -> tuple[Array, Array]:
-        """[K·n] residual and [K·n, U] Jacobian in units of their standard deviation."""
-        rows = self.rows()
+        """[K] residual and [K, U] Jacobian in units of their standard deviation, over the samples of all joints."""
         left, slope = self.residual(z)
-        factor = np.linalg.cholesky(self.covariance(rows))
-        residual = np.linalg.solve(factor, left[rows])
-        jacobian = np.linalg.solve(factor, slope[rows].reshape(len(rows), -1))
-        return residual.ravel(), jacobian.reshape(residual.size, -1)
+        residual, jacobian = [], []
+        for j in range(self.trace.n):
+            rows = self.rows(j)
+            factor = np.linalg.cholesky(self.covariance(rows))
+            residual.append(np.linalg.solve(factor, left[rows, j]))
+            jacobian.append(np.linalg.solve(factor, slope[rows, j]))
+        return np.concatenate(residual), np.concatenate(jacobian)
 
     def innovations(self, z: Array) -> tuple[Array, Array]:
         """e [N, n] and S [N, n] by conditioning each sample on the used ones before it; NaN up to the first."""
         left = self.residual(z)[0]
         e, S = np.full_like(left, np.nan), np.full_like(left, np.nan)
-        rows = self.rows()
-        for k in range(self.first + 1, len(left)):
-            seen = rows[rows < k]
-            full = self.covariance(np.append(seen, k))
-            weights = np.linalg.solve(full[:-1, :-1], full[:-1, -1]) if len(seen) else np.zeros(0)
-            e[k] = left[k] - weights @ left[seen]
-            S[k] = full[-1, -1] - weights @ full[:-1, -1]
+        for j in range(self.trace.n):
+            rows = self.rows(j)
+            for k in range(self.first + 1, len(left)):
+                seen = rows[rows < k]
+                full = self.covariance(np.append(seen, k))
+                weights = np.linalg.solve(full[:-1, :-1], full[:-1, -1]) if len(seen) else np.zeros(0)
+                e[k, j] = left[k, j] - weights @ left[seen, j]
+                S[k, j] = full[-1, -1] - weights @ full[:-1, -1]
         return e, S
 
 

@@ -182,21 +182,21 @@ estimator::residuals estimator::innovations(std::size_t recording, const numbers
     const std::int32_t column = problem_->unknowns.initial_torque(j);
     filters[j] = {column < 0 ? derived.initial_torque[j] : unknowns[static_cast<std::size_t>(column)], true};
   }
-  residuals all{numbers(samples * n, nan), numbers(samples, nan), numbers(samples * n, nan)};
+  residuals all{numbers(samples * n, nan), numbers(samples * n, nan), numbers(samples * n, nan)};
   replay(*problem_, r, unknowns, 0, samples, &finger, [&](std::size_t k) {
     const finger_scratch& s = finger.get()->scratch;
-    const double gain = gains.gain[k], weight = gains.weight[k];
-    const bool starts = gain == 1.0 && weight == 0.0;
     for (std::size_t j = 0; j < n; ++j) {
+      const double gain = gains.gain[k * n + j], weight = gains.weight[k * n + j];
+      const bool starts = gain == 1.0 && weight == 0.0;
       const double torque = finger.get()->remembered.torque[j] - r.external_torque(k, j) - s.friction[j];
       const double e = filters[j].take(torque, s.bias_step[j], starts ? 0.0 : gain, starts);
       if (filters[j].started) {
         all.innovation[k * n + j] = starts ? nan : e;
         all.bias[k * n + j] = filters[j].bias;
       }
-    }
-    if (weight > 0.0) {
-      all.variance[k] = 1.0 / (weight * weight);
+      if (weight > 0.0) {
+        all.variance[k * n + j] = 1.0 / (weight * weight);
+      }
     }
   });
   return all;

@@ -56,7 +56,7 @@ class pass_worker {
     for (std::size_t k = first; k < last && !stopped; ++k) {
       finger_.step(k, recording.time(k), recording.inputs(k));
       take(recording, gains, k);
-      if (joints_.front().full() || k + 1 == last) {
+      if (k + 1 == last || std::any_of(joints_.begin(), joints_.end(), [](const joint_sum& j) { return j.full(); })) {
         for (joint_sum& joint : joints_) {
           joint.end_block(&result.information);
         }
@@ -73,7 +73,11 @@ class pass_worker {
 
  private:
   void take(const recording_track& recording, const bias_gains& gains, std::size_t k) {
-    const bool looked_at = gains.gain[k] > 0.0 || gains.weight[k] > 0.0;
+    const double *gain = &gains.gain[k * joints_.size()], *weight = &gains.weight[k * joints_.size()];
+    bool looked_at = false;
+    for (std::size_t j = 0; j < joints_.size(); ++j) {
+      looked_at = looked_at || gain[j] > 0.0 || weight[j] > 0.0;
+    }
     if (!looked_at && !rows_.sees_event()) {
       return;
     }
@@ -96,7 +100,7 @@ class pass_worker {
     for (std::size_t j = 0; j < joints_.size(); ++j) {
       const double torque = rows_.measured(j) - recording.external_torque(k, j);
       joints_[j].rows.add(block_rows::sample, residual_column, torque - rows_.torque(j));
-      joints_[j].filter(gains.gain[k], gains.weight[k] * recording.weight_root(j));
+      joints_[j].filter(gain[j], weight[j] * recording.weight_root(j));
     }
   }
 

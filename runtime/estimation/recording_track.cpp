@@ -109,9 +109,10 @@ recording_track::recording_track(free_finger* finger, const recording_arrays& a)
   angle_ = copied(a.inputs.joint_position, a.samples * joints_);
   velocity_ = copied(a.inputs.joint_velocity, a.samples * joints_);
   external_ = copied(a.external_torque, a.samples * joints_);
-  use_.assign(a.samples, 1);
-  if (a.use) {
-    std::copy_n(a.use, a.samples, use_.begin());
+  for (std::size_t k = 0; k < a.samples; ++k) {
+    for (std::size_t j = 0; j < joints_; ++j) {
+      use_.push_back((!a.use || a.use[k] != 0) && (!a.silent || a.silent[k * joints_ + j] == 0));
+    }
   }
   for (std::size_t k = 0; k < external_.size(); ++k) {
     if (!std::isfinite(external_[k])) {
@@ -137,7 +138,11 @@ recording_track::recording_track(free_finger* finger, const recording_arrays& a)
           "bias.noise_std = 0: expected above 0 N.m for a fit, which weighs the residuals by it");
     }
   }
-  const auto used = a.samples - static_cast<std::size_t>(std::count(use_.begin(), use_.end(), 0));
+  std::size_t used = 0;
+  for (std::size_t k = 0; k < a.samples; ++k) {
+    const auto row = use_.begin() + static_cast<std::ptrdiff_t>(k * joints_);
+    used += std::any_of(row, row + static_cast<std::ptrdiff_t>(joints_), [](unsigned char each) { return each != 0; });
+  }
   if (used < 2) {
     throw std::invalid_argument(std::to_string(used) + " samples to learn from: expected at least 2");
   }
@@ -163,7 +168,14 @@ tendonfmu_inputs recording_track::inputs(std::size_t row) const {
 }
 
 bias_gains::bias_gains(const recording_track& r, const finger_settings& settings, std::size_t stride)
-    : gain(r.samples(), 0.0), weight(r.samples(), 0.0) {
+    : gain(r.samples() * r.joints(), 0.0), weight(gain) {
+  for (std::size_t j = 0; j < r.joints(); ++j) {
+    find(r, settings, stride, j);
+  }
+}
+
+void bias_gains::find(const recording_track& r, const finger_settings& settings, std::size_t stride,
+                      std::size_t joint) {
   bool started = settings.has_initial_torque != 0;
   const double given = settings.initial_variance;
   double variance = given >= 0.0 ? given : r.plain_noise(0);
@@ -171,21 +183,22 @@ bias_gains::bias_gains(const recording_track& r, const finger_settings& settings
     if (k > 0 && started) {
       variance += settings.drift_variance * (r.time(k) - r.time(k - 1));
     }
-    const bool looked_at = r.used(k) && (k % stride == 0 || (!started && k < stride));
+    const bool looked_at = r.used(k, joint) && (k % stride == 0 || (!started && k < stride));
     if (!looked_at || (k == 0 && started)) {
       continue; /* steps 5 and 6 are not for the first sample */
     }
     if (!started) {
       started = true;
-      gain[k] = 1.0;
+      gain[k * r.joints() + joint] = 1.0;
       variance = given >= 0.0 ? given : r.plain_noise(k);
       continue;
     }
     const double noise = r.noise(k) / static_cast<double>(stride);
     const double total = variance + noise;
-    gain[k] = variance / total;
-    weight[k] = 1.0 / std::sqrt(total);
-    variance *= 1.0 - gain[k];
+    const double share = variance / total;
+    gain[k * r.joints() + joint] = share;
+    weight[k * r.joints() + joint] = 1.0 / std::sqrt(total);
+    variance *= 1.0 - share;
   }
 }
 

@@ -48,7 +48,8 @@ class recording_track {
   int kinematics_source() const { return source_; }
   double time(std::size_t row) const { return time_[row]; }
   tendonfmu_inputs inputs(std::size_t row) const;
-  bool used(std::size_t row) const { return use_[row] != 0; }
+  std::size_t joints() const { return joints_; }
+  bool used(std::size_t row, std::size_t joint) const { return use_[row * joints_ + joint] != 0; }
   double external_torque(std::size_t row, std::size_t joint) const {
     return external_.empty() ? 0.0 : external_[row * joints_ + joint];
   }
@@ -66,21 +67,24 @@ class recording_track {
 
  private:
   std::vector<double> time_, force_, position_, angle_, velocity_, external_, noise_, plain_noise_;
-  std::vector<unsigned char> use_;
+  std::vector<unsigned char> use_; /* [N × n] */
   std::vector<std::vector<unsigned char>> states_;
   std::size_t joints_, tendons_, segment_length_;
   std::vector<double> weight_root_;
   int source_;
 };
 
-/* What the bias filter (docs/reference/semantics/bias.md#bias-tracker) does at every sample; the same for all joints
- * and all parameters. */
+/* What the bias filter (docs/reference/semantics/bias.md#bias-tracker) does at every sample and joint; the same for all
+ * parameters. */
 struct bias_gains {
   /* stride: only every stride-th sample is looked at, for `stride` of them */
   bias_gains(const recording_track& recording, const finger_settings& settings, std::size_t stride);
 
-  std::vector<double> gain;   /* [N] K; 0 where not used, 1 where the bias starts */
-  std::vector<double> weight; /* [N] 1/√S; 0 where nothing is learned */
+  std::vector<double> gain;   /* [N × n] K; 0 where not used, 1 where the bias starts */
+  std::vector<double> weight; /* [N × n] 1/√S; 0 where nothing is learned */
+
+ private:
+  void find(const recording_track& recording, const finger_settings& settings, std::size_t stride, std::size_t joint);
 };
 
 }  // namespace tendonfmu::estimation

@@ -60,6 +60,9 @@ struct recording_arrays {
   const double* external_torque; /* [N × n] N·m, known load on the joints (eq. 9), or nullptr */
   const unsigned char* use;      /* [N] 1 where to learn, or nullptr: everywhere */
   int kinematics_source;         /* tendonfmu_kinematics_source */
+  /* [N × n] 1 where a joint says nothing, as one at rest that its motor holds, or nullptr: nowhere. Not for a learner
+   */
+  const unsigned char* silent = nullptr;
 };
 
 /* --- all recordings at once --------------------------------------------------------------------------------------- */
@@ -144,9 +147,9 @@ class estimator {
   block_means jacobian(std::size_t recording, const numbers& z, std::size_t first, std::size_t blocks,
                        std::size_t length) const;
 
-  /* Residuals before the bias update (τ − T_eff) [N × n], their variances S [N], and the bias after the update [N × n].
+  /* Residuals before the bias update (τ − T_eff), their variances S, and the bias after the update, each [N × n].
    * NaN: residuals where the bias has not started, S where nothing is learned either (samples not used, which have a
-   * residual, and the first). */
+   * residual, joints that are silent, and the first). */
   struct residuals {
     numbers innovation, variance, bias;
   };

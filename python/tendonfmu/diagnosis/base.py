@@ -101,7 +101,7 @@ def _digest(given: Finger, recordings: Sequence[FitRecording], settings: FitSett
             recording.time,
             recording.target,
             recording.train,
-            recording.at_rest,
+            recording.silent,
             *(groups[name] for name in sorted(groups)),
         ):
             known.update(values.tobytes())

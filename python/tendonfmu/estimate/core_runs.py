@@ -65,6 +65,9 @@ class CoreRuns:
         self.torque: Numbers = self.grid.means([recording.target for recording in recordings])
         counts = self.used | (self.grid.means([recording.at_rest for recording in recordings]) == 1.0)
         self.still: Flags = counts & np.all(fastest <= number_of(data, "velocity_threshold.joint"), axis=1)
+        silent = self.grid.means([recording.silent for recording in recordings]) > 0.0
+        # joints that say something; what all leave while they rest shows a drift
+        self.loud: Flags = ~silent | silent.all(axis=1, keepdims=True)
         self.added: Numbers | float = 0.0  # torque that is measured beyond that of the runs' forces, N·m [B, n]
         self._pool = ThreadPoolExecutor(threads or os.cpu_count() or 1)
         self._instances = _Instances()
@@ -83,7 +86,7 @@ class CoreRuns:
     def residual(self, values: Mapping[str, float] | None = None) -> Numbers:
         """Return block means of τ − T, [B, n] (N·m). `values`: numbers that differ, by path, SI units."""
         parts = self._pool.map(lambda each: self._left(self._image, values or {}, each), self.stretches)
-        return np.concatenate(list(parts)) + self.added
+        return np.asarray(self.loud * (np.concatenate(list(parts)) + self.added))
 
     def columns(
         self, moves: Sequence[tuple[Mapping[str, float], float]], values: Mapping[str, float] | None = None
@@ -98,7 +101,7 @@ class CoreRuns:
         def fill(k: int) -> None:
             moved, length = moves[k]
             left = np.concatenate([self._left(self._image, {**at, **moved}, each) for each in self.stretches])
-            columns[:, :, k] = (left + self.added - base) / length
+            columns[:, :, k] = (self.loud * (left + self.added) - base) / length
 
         list(self._pool.map(fill, range(len(moves))))
         return columns

@@ -141,9 +141,10 @@ class Estimator:
         kinematics_source: int = 1,
         external_torque: Array | None = None,
         use: Array | None = None,
+        silent: Array | None = None,
     ) -> int:
         """Copy a recording into the estimator and return its number."""
-        # arrays: [N] (s); external_torque: [N, n] (N·m); use: [N]
+        # arrays: [N] (s); external_torque: [N, n] (N·m); use: [N]; silent: [N, n] joints that say nothing
         with _refusals():
             return int(
                 self._estimator.add_recording(
@@ -151,6 +152,7 @@ class Estimator:
                     kinematics_source=kinematics_source,
                     external_torque=_matrix(external_torque),
                     use=_whole(use, np.uint8),
+                    silent=_whole(silent, np.uint8),
                 )
             )
 
@@ -186,8 +188,8 @@ class Estimator:
 
     def innovations(self, recording: int, z: Array) -> tuple[Numbers, Numbers, Numbers]:
         """Compute the residuals of a recording before each bias update."""
-        # z: [u]; returns [N, n] (N·m), [N] their variance ((N·m)²); NaN also at samples that are not used, [N, n] bias
-        # after the update (N·m)
+        # z: [u]; returns, all [N, n], residuals (N·m), their variance ((N·m)²), NaN also where nothing is learned, and
+        # the bias after the update (N·m)
         with _refusals():
             arrays = self._estimator.innovations(recording, _matrix(z))
         innovation, variance, bias = (np.asarray(array) for array in arrays)

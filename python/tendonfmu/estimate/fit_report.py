@@ -51,8 +51,8 @@ def residual_entry(evaluations: Sequence[Evaluation], which: str) -> dict[str, l
     chosen = [np.asarray(getattr(evaluation.recording, which)) for evaluation in evaluations]
     if not any(flags.any() for flags in chosen):
         return None
-    unknown = np.isnan(np.concatenate([evaluation.model.residual for evaluation in evaluations])).any(axis=1)
-    flags = np.concatenate(chosen) & ~unknown
+    flags = np.concatenate(chosen)
+    unknown = np.isnan(np.concatenate([evaluation.model.residual for evaluation in evaluations]))
     series = {
         "rms": [evaluation.model.residual for evaluation in evaluations],
         "start_rms": [evaluation.start.residual for evaluation in evaluations],
@@ -60,7 +60,7 @@ def residual_entry(evaluations: Sequence[Evaluation], which: str) -> dict[str, l
         "model_only_rms": [evaluation.model_only for evaluation in evaluations],
         "torque_rms": [evaluation.recording.target for evaluation in evaluations],
     }
-    return {name: rms(np.concatenate(values), flags) for name, values in series.items()}
+    return {name: rms(np.where(unknown, np.nan, np.concatenate(values)), flags) for name, values in series.items()}
 
 
 LEAST_NIS, MOST_NIS, MOST_LAG_ONE = 0.5, 2.0, 0.3  # values outside give a warning

@@ -315,9 +315,8 @@ class FrictionFit(Configured):
     def score(self, recording: RecordingSource) -> float:
         """Compute 1 − Σ residual² / Σ (torque − mean)² over all joints and samples without contact; 1 is perfect."""
         prepared, left = self._left(recording)
-        rows = prepared.tracked & ~np.isnan(left).any(axis=1)
-        torque = prepared.target[rows]
-        return float(1 - np.sum(left[rows] ** 2) / np.sum((torque - torque.mean(axis=0)) ** 2))
+        torque = np.where(prepared.tracked[:, None] & ~np.isnan(left), prepared.target, np.nan)
+        return float(1 - np.nansum(left[prepared.tracked] ** 2) / np.nansum((torque - np.nanmean(torque, axis=0)) ** 2))
 
     def _left(self, source: RecordingSource) -> tuple[FitRecording, Numbers]:
         self._require_fitted()

@@ -46,7 +46,7 @@ Start = Callable[[Sequence[str]], Numbers]
 def _estimator(structure: Structure, recordings: Sequence[FitRecording]) -> Estimator:
     """Build the estimator. Raises InputError if nothing gives the size of a number."""
     # a bias that does not learn at rest must not forget there what it holds
-    rests = any(recording.at_rest.any() for recording in recordings)
+    rests = any(recording.silent.any() for recording in recordings)
     try:
         image = image_that_holds(structure.start.data) if rests else structure.start.image
         return Estimator(image, structure.group, structure.scale)
@@ -77,7 +77,7 @@ def _add_recordings(estimator: Estimator, recordings: Sequence[FitRecording]) ->
     for place, recording in enumerate(recordings):
         for part in recording.parts:
             if np.count_nonzero(recording.train[part]) > 1:
-                estimator.add_recording(**_rows(recording, part))
+                estimator.add_recording(**_rows(recording, part), silent=recording.silent[part])
                 added.append((place, part))
     if not added:
         paths = ", ".join(str(recording.path) for recording in recordings)
@@ -99,7 +99,7 @@ def _measured_weights(
         innovation, variance, _ = estimator.innovations(number, z)  # the variance is NaN where nothing is learned
         step = float(np.median(np.diff(recordings[place].time[part])))
         stroke = stroke_time(recordings[place].model.joint_speed[part], step)
-        measured = sample_weights(innovation / np.sqrt(variance)[:, None], step, stroke)
+        measured = sample_weights(innovation / np.sqrt(variance), step, stroke)
         weights[place][part] = np.minimum(measured, most)
     return weights
 

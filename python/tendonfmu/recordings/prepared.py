@@ -55,7 +55,7 @@ class FitRecording:
     held_out: Flags
     contact_out: Flags
     faulty: Flags
-    at_rest: Flags  # left out by `without_rests`
+    silent: Flags  # [N, n] joints at rest, which say nothing: `without_rests`
     parts: list[slice]  # slices without a gap
     model: Model  # what the given finger makes of it
     warnings: list[str]  # sentences about what was left out and what is poor
@@ -69,6 +69,11 @@ class FitRecording:
     def time(self) -> Numbers:
         """Times [N] (s)."""
         return self.recording.time
+
+    @property
+    def at_rest(self) -> Flags:
+        """Samples [N] that are left out since all joints rest."""
+        return self.silent.all(axis=1) & ~(self.contact_out | self.faulty)
 
     @property
     def tracked(self) -> Flags:
@@ -100,7 +105,9 @@ class FitRecording:
 
     def run(self, data: Mapping[str, Any]) -> Model:
         """Run a finger over the recording; its bias learns from the tracked samples."""
-        return run_parts(data, self.recording.arrays(), self.parts, self.tracked, self.kinematics)
+        model = run_parts(data, self.recording.arrays(), self.parts, self.tracked, self.kinematics)
+        residual, variance = (np.where(self.silent, np.nan, each) for each in (model.residual, model.variance))
+        return replace(model, residual=residual, variance=variance)
 
     def entry(self) -> dict[str, Any]:
         """Return what a report says about the recording."""
@@ -153,7 +160,7 @@ def prepare(finger: Finger, recording: Recording, kinematics: int, held: Held) -
         held_out=held_out,
         contact_out=contact,
         faulty=faulty,
-        at_rest=np.zeros(len(recording), dtype=bool),
+        silent=np.zeros((len(recording), joints), dtype=bool),
         parts=parts,
         model=run_parts(finger.data, recording.arrays(), parts, usable, kinematics),
         warnings=[*warnings, *sentences],
@@ -163,29 +170,33 @@ def prepare(finger: Finger, recording: Recording, kinematics: int, held: Held) -
 def without_rests(recording: FitRecording, finger: Finger, is_batch: bool) -> FitRecording:
     """Let nothing learn from samples at rest, but for a filter whose bias does. If it is constant, begin in motion."""
     is_constant = bias_is_constant(finger.data)
-    rests, parts = left_at_rest(finger.data, recording.model.joint_speed), recording.parts
+    silent, parts = left_at_rest(finger.data, recording.model.joint_speed), recording.parts
+    rests = np.asarray(silent.all(axis=1))
     train, held_out = recording.train & ~rests, recording.held_out & ~rests
-    if not (is_batch or is_constant) or not rests.any() or not train.any():
+    if not (is_batch or is_constant) or not silent.any() or not train.any():
         return recording
     if is_constant:
         parts = [slice(part.start + int(np.argmin(rests[part])), part.stop) for part in parts if not rests[part].all()]
     _refuse_too_little(recording.recording, parts, train | held_out, recording.contact_out)
-    left = replace(recording, train=train, held_out=held_out, at_rest=recording.tracked & rests, parts=parts)
+    left = replace(recording, train=train, held_out=held_out, silent=silent, parts=parts)
     return replace(left, model=left.run(finger.data))
 
 
 def left_at_rest(data: Mapping[str, Any], joint_velocity: Numbers) -> Flags:
-    """Return [N] the samples at rest that a fit leaves out. joint_velocity: [N, n] (rad/s).
+    """Return [N, n] the joints at rest that a fit leaves out. joint_velocity: [N, n] (rad/s).
 
-    A motor holds a joint that sticks with any torque up to its friction, |F| ≤ F(v_min), unless friction has a memory
-    that says more. Few rests are no harm to a bias that learns.
+    A motor holds a joint whose friction sticks everywhere with any torque up to it, |F| ≤ F(v_min), unless friction has
+    a memory that says more. Few rests are no harm to a bias that learns, and a joint that never moves has no others.
     """
-    rests = np.ones(len(joint_velocity), dtype=bool)
+    turns, joints = np.array(moment_arms(data), dtype=bool), np.arange(1, joint_velocity.shape[1] + 1)
+    rests = np.ones(joint_velocity.shape, dtype=bool)
     for effect in effects(data):
-        rests &= np.abs(sliding_velocity(data, effect, joint_velocity)) <= velocity_threshold(data, effect)
+        still = np.abs(sliding_velocity(data, effect, joint_velocity)) <= velocity_threshold(data, effect)
+        acts = turns[effect.tendon - 1] & (joints >= effect.joint) if effect.tendon else joints == effect.joint
+        rests[:, acts] &= still[:, None]
     remembers = any(row["effect"] == "presliding" for row in data.get("extensions") or ())
-    are_few = rests.mean() <= MANY_RESTS and not bias_is_constant(data)
-    return rests & (not (remembers or are_few or rests.all()))
+    are_few = (rests.mean(axis=0) <= MANY_RESTS) & (not bias_is_constant(data))
+    return np.asarray(rests & ~(remembers | are_few | rests.all(axis=0)))
 
 
 def bias_is_constant(data: Mapping[str, Any]) -> bool:

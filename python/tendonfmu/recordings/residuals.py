@@ -73,12 +73,9 @@ def delayed_torque(data: Mapping[str, Any], arrays: Mapping[str, Numbers], torqu
 
 
 def rms(values: Numbers, chosen: Flags) -> list[float]:
-    """Return the root mean square of the chosen rows. values: [N, n]; chosen: [N]; returns [n]."""
-    picked = values[chosen]
-    picked = picked[~np.isnan(picked).any(axis=1)]
-    if not len(picked):
-        return [math.nan] * values.shape[1]
-    return [float(value) for value in np.sqrt(np.mean(picked**2, axis=0))]
+    """Return the root mean square of the chosen rows, but for NaN. values: [N, n]; chosen: [N]; returns [n]."""
+    columns = [column[~np.isnan(column)] for column in values[chosen].T]
+    return [float(np.sqrt(np.mean(column**2))) if len(column) else math.nan for column in columns]
 
 
 def consistency(standardised: Sequence[Numbers], share: float = 1.0) -> dict[str, Any]:

@@ -68,7 +68,7 @@ def expected_recording(data: Data, performed: Excitation, kinematics: int) -> Fi
         held_out=none,
         contact_out=none,
         faulty=none,
-        at_rest=none,
+        silent=np.zeros((samples, len(data["joints"])), dtype=bool),
         parts=whole,
         model=run_parts(data, recording.arrays(), whole, ~none, kinematics),
         warnings=[],

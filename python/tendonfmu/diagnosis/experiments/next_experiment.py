@@ -327,7 +327,7 @@ def _shortened(recording: FitRecording) -> FitRecording:
     rows = np.arange(part.start, part.stop)[time - time[0] <= _OLD_SECONDS][::every]
     groups = {name: np.ascontiguousarray(values[rows]) for name, values in recording.recording.groups.items()}
     whole = [slice(0, len(rows))]
-    by_sample = ("target", "train", "held_out", "contact_out", "faulty", "at_rest")
+    by_sample = ("target", "train", "held_out", "contact_out", "faulty", "silent")
     model = {each.name: np.ascontiguousarray(getattr(recording.model, each.name)[rows]) for each in fields(Model)}
     return replace(
         recording,
