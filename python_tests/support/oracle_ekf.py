@@ -56,9 +56,9 @@ class JosephFilter:
                 continue
             self._predict(jump, G, part.drift * dt, dt)
             e[k] = part.y[k] - torque - self.bias
-            slack = bool(part.use[k]) and bool(part.trace.slack(self.unknowns.theta(self.z), slice(k, k + 1))[0])
+            slack = bool(part.use[k].all()) and bool(part.trace.slack(self.unknowns.theta(self.z), slice(k, k + 1))[0])
             self.slack_samples += slack
-            S[k] = self._correct(H, e[k], part.noise[k], apply=bool(part.use[k]) and not slack)
+            S[k] = self._correct(H, e[k], part.noise[k], apply=bool(part.use[k].all()) and not slack)
         return e, S
 
     def _linearised(self, part: Likelihood, k: int) -> tuple[Array, Array, Array, Array]:
