@@ -97,6 +97,9 @@ def set_to(path: str, value: Any) -> Callable[[Description], None]:
             ["velocity_threshold.tendon", "velocity_threshold.joint"],
         ),
         (set_to("contact/threshold", [0.03, 30.0]), ["contact.threshold[2]"]),
+        (set_to("bias", {"drift_variance": 0.0, "initial_variance": 0.0}), ["bias.forget_rate"]),
+        (set_to("bias", {"drift_variance": 0.0, "initial_variance": 0.0, "forget_rate": 0.0}), []),
+        (set_to("bias", {"drift_variance": 0.0, "initial_variance": 0.0, "forgetting": "absorption"}), []),
     ],
 )
 def test_warnings(change: Callable[[Description], None], expected: list[str], tmp_path: Path) -> None:

@@ -15,14 +15,13 @@ from tendonfmu.arrays import Numbers, flagged_rows
 from tendonfmu.diagnosis.gain import require_unseen
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import check_unseen
-from tendonfmu.model import Finger, FingerSource, read_finger
+from tendonfmu.model import Finger, FingerSource, bias_is_constant, read_finger
 from tendonfmu.recordings import (
     UNFIT_FOR_SEARCH,
     FitRecording,
     Held,
     RecordingSource,
     admit,
-    bias_is_constant,
     listed_sources,
     prepare,
     read_recordings,

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
         LIMITS,
         MAGNITUDES,
         RANGES,
+        bias_is_constant,
         extended_row,
         extension_numbers,
         extension_rows,

@@ -97,6 +97,11 @@ def number_of(data: Mapping[str, Any], path: str) -> float:
     return DEFAULTS[path] if node is None else float(node)
 
 
+def bias_is_constant(data: Mapping[str, Any]) -> bool:
+    """Return whether the bias learns nothing."""
+    return number_of(data, "bias.drift_variance") == 0.0 and (data.get("bias") or {}).get("initial_variance") == 0.0
+
+
 # --- paths ------------------------------------------------------------------------------------------------------------
 
 

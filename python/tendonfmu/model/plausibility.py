@@ -15,6 +15,7 @@ import numpy as np
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.model.description import Finger, laws, sides
+from tendonfmu.model.description_numbers import bias_is_constant, number_of
 
 LONGEST_ARM = 0.3  # m; arms of fingers have 2 to 20 mm, those of a wrist 50
 SHORTEST_ARM = 1e-4  # m
@@ -34,7 +35,7 @@ class Finding:
     severity: str  # "error" (no fit of it is sound) or "warning"
     # of a recording: "sign", "exchange", "scale", "clock", "unfit", "routing", "columns", "pushing", "against", "held",
     # "clipped", "coarse", "gaps", "lost" or "jitter". Of a description: "moment_arms", "stiffness", "cover",
-    # "friction", "angles" or "threshold"
+    # "friction", "angles", "threshold" or "bias"
     kind: str
     path: Path  # the recording or description
     columns: tuple[str, ...]  # columns of the recording, or keys of the description
@@ -69,6 +70,7 @@ def description_findings(finger: Finger) -> list[Finding]:
         *_laws(data),
         *_angles(data),
         *_thresholds(data, arms),
+        *_bias(data),
     ]
     return [
         Finding("warning", kind, finger.path, (key,), seen, probably, write)
@@ -198,3 +200,10 @@ def _thresholds(data: Mapping[str, Any], arms: Numbers) -> Iterator[Row]:
         if threshold > most:
             seen = f"{threshold:g} N.m: more than a tendon with {STRONGEST_FORCE:g} N can cause"
             yield "threshold", f"contact.threshold[{j}]", seen, "a torque in N.mm", "expected N.m: 0.03 for 30 N.mm"
+
+
+def _bias(data: Mapping[str, Any]) -> Iterator[Row]:
+    rate, bias = number_of(data, "bias.forget_rate"), data.get("bias") or {}
+    if rate > 0.0 and bias.get("forgetting") != "absorption" and bias_is_constant(data):
+        seen = f"{rate:g} 1/s with a bias that never learns (drift_variance 0, initial_variance 0)"
+        yield "bias", "bias.forget_rate", seen, "friction that every rest leaves in the bias", "expected forget_rate 0"

@@ -34,7 +34,6 @@ if TYPE_CHECKING:
         Grid,
         Held,
         Segment,
-        bias_is_constant,
         held_out_blocks,
         make_grid,
         motion_of,

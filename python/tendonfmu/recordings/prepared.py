@@ -16,6 +16,7 @@ from tendonfmu.files import are, counted, percent
 from tendonfmu.model import (
     INPUTS_OF_SOURCE,
     Finger,
+    bias_is_constant,
     effects,
     inputs_used,
     moment_arms,
@@ -197,11 +198,6 @@ def left_at_rest(data: Mapping[str, Any], joint_velocity: Numbers) -> Flags:
     remembers = any(row["effect"] == "presliding" for row in data.get("extensions") or ())
     are_few = (rests.mean(axis=0) <= MANY_RESTS) & (not bias_is_constant(data))
     return np.asarray(rests & ~(remembers | are_few | rests.all(axis=0)))
-
-
-def bias_is_constant(data: Mapping[str, Any]) -> bool:
-    """Return whether the bias learns nothing."""
-    return number_of(data, "bias.drift_variance") == 0.0 and (data.get("bias") or {}).get("initial_variance") == 0.0
 
 
 def _parts(time: Numbers) -> tuple[list[slice], Flags]:
