@@ -204,6 +204,7 @@ def _thresholds(data: Mapping[str, Any], arms: Numbers) -> Iterator[Row]:
 
 def _bias(data: Mapping[str, Any]) -> Iterator[Row]:
     rate, bias = number_of(data, "bias.forget_rate"), data.get("bias") or {}
-    if rate > 0.0 and bias.get("forgetting") != "absorption" and bias_is_constant(data):
+    remembers = any(row["effect"] == "presliding" for row in data.get("extensions") or ())
+    if rate > 0.0 and bias.get("forgetting") != "absorption" and bias_is_constant(data) and not remembers:
         seen = f"{rate:g} 1/s with a bias that never learns (drift_variance 0, initial_variance 0)"
         yield "bias", "bias.forget_rate", seen, "friction that every rest leaves in the bias", "expected forget_rate 0"
