@@ -24,7 +24,7 @@ PAGE = "hand.html"
 COLOURS = {"fine": "#7fc9b3", "doubt": "#e69f00", "bad": "#d55e00", "failed": "#b4bcc4"}  # of the tones
 
 # lengths of the drawing in CSS pixels, y downward; a page shrinks it to its width
-SPACING, THICK = 66.0, 24.0  # between fingers, and of one
+SPACING, THICK = 82.0, 24.0  # between fingers, and of one
 LONGEST, PER_JOINT = 136.0, 36.0  # a finger, and each of its joints
 PALM, HEAD = 96.0, 60.0  # heights of the palm and of the room above it for two lines of text
 SPREAD = math.radians(5.0)  # between neighbours
