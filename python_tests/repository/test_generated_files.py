@@ -1,4 +1,4 @@
-"""What follows from the tables in runtime/description is what tools/tables/generate.py makes of them."""
+"""What follows from tables, and from classes of the package, is what tools/tables/generate.py makes of them."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_each_generated_file_says_so_in_its_first_line(generator: ModuleType) ->
     files = generator.generated(generator.read_facts())
     assert len(files) > 12
     for path, text in files.items():
-        assert generator.NOTICE in "".join(text.splitlines()[:2]), path
+        assert f"by `{generator.COMMAND}`: do not edit." in "".join(text.splitlines()[:2]), path
 
 
 def changed(generator: ModuleType, change: Callable[[Any], object]) -> set[str]:

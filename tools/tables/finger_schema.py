@@ -9,6 +9,7 @@ from facts import Facts, Row, is_list, last, of, plain, symbol
 
 Schema = dict[str, Any]
 
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
 NAME: Schema = {"type": "string", "minLength": 1, "maxLength": 200, "pattern": "^[^\\u0000-\\u001f\\u007f]*$"}
 NULL: Schema = {"type": "null"}
 LAW = "F(v) = sgn(v)·(coulomb + (static − coulomb)·exp(−|v|/stribeck_velocity) + viscous·|v|), static >= coulomb"
@@ -40,7 +41,7 @@ PLACES: Mapping[str, Schema] = {
 def finger_schema(facts: Facts) -> Schema:
     effects = facts.effects["effects"]
     schema = {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$schema": DIALECT,
         "$id": "urn:tendonfmu:finger-1",
         "title": "Finger description of TendonFMU",
         **_object(facts, facts.rows[0]),

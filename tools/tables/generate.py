@@ -1,6 +1,6 @@
 """Writes every file that follows from the tables of facts in runtime/description: keys, effects and outputs.
 
-The page of a rig follows from its JSON Schema.
+The page of a rig follows from its JSON Schema; the schemas of reports from classes of the package.
 
     python tools/tables/generate.py          writes the files that differ, and names them
     python tools/tables/generate.py --check  writes nothing; exit code 1 where a file differs
@@ -18,9 +18,10 @@ from pathlib import Path
 from typing import Any
 
 from facts import ROOT, Facts, Row, is_list, last, of, parent, plain, read_facts, symbol
-from finger_schema import documented, finger_schema, units_of
+from finger_schema import DIALECT, documented, finger_schema, units_of
 from jinja2 import Environment, FileSystemLoader
 from rig_keys import rig_sections
+from typed_schema import PACKAGE, Module
 
 COMMAND = "python tools/tables/generate.py"
 NOTICE = f"Generated from the tables in runtime/description by `{COMMAND}`: do not edit."
@@ -38,6 +39,11 @@ TEMPLATES = {
     "description_keys.md.jinja": "docs/reference/description_keys.md",
     "fmu_variables.md.jinja": "docs/reference/fmu_variables.md",
     "rig.md.jinja": "docs/reference/rig.md",
+}
+# Name of the schema -> module in the package, its class, and what the schema begins with.
+REPORTS = {
+    "score_report": ("detect/score_types.py", "ScoreReport", {"title": "TendonFMU score report"}),
+    "tune_report": ("detect/tune_types.py", "TuneReport", {"title": "TendonFMU tune report"}),
 }
 
 
@@ -119,22 +125,29 @@ def option_of(row: Row, facts: Facts) -> str:
 WIDTH = 120
 
 
-def json_text(value: Any, indent: str = "") -> str:
+def json_text(value: Any, indent: str = "", width: int = WIDTH) -> str:
     """JSON with every list and object on one line that has room for it."""
     line = json.dumps(value, ensure_ascii=False)
-    if len(indent) + len(line) < WIDTH or not isinstance(value, (dict, list)):
+    if len(indent) + len(line) < width or not isinstance(value, (dict, list)):
         return line
     inner = indent + "  "
     if isinstance(value, list):
-        parts = [json_text(each, inner) for each in value]
+        parts = [json_text(each, inner, width) for each in value]
     else:
-        parts = [f"{json.dumps(key)}: {json_text(each, inner)}" for key, each in value.items()]
+        parts = [f"{json.dumps(key)}: {json_text(each, inner, width)}" for key, each in value.items()]
     begin, end = "[]" if isinstance(value, list) else "{}"
     return begin + "\n" + ",\n".join(inner + part for part in parts) + f"\n{indent}{end}"
 
 
 def schema_text(facts: Facts) -> str:
     return json_text({"$comment": NOTICE} | finger_schema(facts)) + "\n"
+
+
+def report_text(file: str, root: str, head: Row) -> str:
+    """The JSON Schema of a class of the package."""
+    comment = f"Generated from python/tendonfmu/{file} by `{COMMAND}`: do not edit."
+    begin = {"$comment": comment, "$schema": DIALECT, **head}
+    return json_text(Module(PACKAGE / file).schema(root, begin), width=2 * WIDTH) + "\n"
 
 
 def numbers_text(facts: Facts) -> str:
@@ -260,7 +273,8 @@ def generated(facts: Facts) -> dict[str, str]:
         "python/tendonfmu/schema/description_numbers.json": numbers_text,
         "modelDescription/variables.json": variables_text,
     }
-    return files | {path: make(facts) for path, make in makers.items()}
+    files |= {path: make(facts) for path, make in makers.items()}
+    return files | {f"python/tendonfmu/schema/{name}.schema.json": report_text(*of) for name, of in REPORTS.items()}
 
 
 def differing(files: Mapping[str, str], root: Path = ROOT) -> list[str]:

@@ -371,7 +371,7 @@ class _Run:
         scored = score_recordings(
             file, self._case.pushes, options, progress=lambda done, total: step(done / max(total, 1))
         )
-        report = detect_score_report.build_report(scored)
+        report: Mapping[str, Any] = detect_score_report.build_report(scored)
 
         def of(key: str) -> list[tuple[str, dict[str, Any]]]:
             return [(Path(each["path"]).name, row) for each in report["recordings"] for row in each[key]]
