@@ -18,7 +18,6 @@ from facts import ROOT
 Schema = dict[str, Any]
 
 PACKAGE = ROOT / "python" / "tendonfmu"
-BASE = PACKAGE / "files" / "json_types.py"
 KINDS = {str: "string", int: "integer", float: "number", bool: "boolean", type(None): "null"}
 
 
@@ -35,15 +34,21 @@ class Module:
     def __init__(self, path: Path) -> None:
         self._names: dict[str, Any] = {"NotRequired": NotRequired}
         self._classes: dict[str, tuple[ast.ClassDef, list[str]]] = {}  # by name, with the lines of its file
-        for file in (BASE, path):
-            text = file.read_text(encoding="utf-8")
-            tree = ast.parse(text)
-            own = {f"tendonfmu.{BASE.parent.name}.{BASE.stem}"}
-            tree.body = [node for node in tree.body if getattr(node, "module", None) not in own and not _is_check(node)]
-            exec(compile(tree, str(file), "exec"), self._names)
-            self.doc = ast.get_docstring(tree) or ""
-            lines = text.splitlines()
-            self._classes |= {node.name: (node, lines) for node in tree.body if isinstance(node, ast.ClassDef)}
+        self._read(path)
+
+    def _read(self, path: Path) -> None:
+        """Read a module, after those of the package that it imports."""
+        text = path.read_text(encoding="utf-8")
+        tree = ast.parse(text)
+        for node in list(tree.body):
+            module = node.module or "" if isinstance(node, ast.ImportFrom) else ""
+            if module.startswith("tendonfmu."):
+                self._read(PACKAGE.parent / f"{module.replace('.', '/')}.py")
+            if module.startswith("tendonfmu.") or isinstance(node, ast.If):  # under TYPE_CHECKING
+                tree.body.remove(node)
+        exec(compile(tree, str(path), "exec"), self._names)
+        lines = text.splitlines()
+        self._classes |= {node.name: (node, lines) for node in tree.body if isinstance(node, ast.ClassDef)}
 
     def schema(self, root: str, head: Schema) -> Schema:
         """The schema of a class or type; `head` comes before its keys."""
@@ -105,10 +110,6 @@ class Module:
                 yield part.target.id, of, _comment(lines, part)
 
 
-def _is_check(node: ast.stmt) -> bool:
-    return isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
-
-
 def _comment(lines: list[str], part: ast.AnnAssign) -> str:
     """The comment behind a key, and before it that of the lines above."""
     first, last, end = part.lineno - 1, part.end_lineno or 0, part.end_col_offset or 0
@@ -125,9 +126,9 @@ def _one_of(schemas: list[Schema]) -> Schema:
     if len(others) == len(schemas) or len(others) > 1:
         return {"anyOf": schemas}
     (other,) = others
-    if isinstance(other.get("type"), str):
-        return other | {"type": [other["type"], "null"]}
-    return other | {"enum": [*other["enum"], None]} if "enum" in other else {"anyOf": schemas}
+    if not isinstance(other.get("type"), str):
+        return {"anyOf": schemas}
+    return other | {"type": [other["type"], "null"]} | ({"enum": [*other["enum"], None]} if "enum" in other else {})
 
 
 def _with_single_ones_inside(schema: Schema) -> Schema:

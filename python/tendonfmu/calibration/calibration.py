@@ -61,6 +61,7 @@ from tendonfmu.recordings import (
     routed,
     routing_entry,
 )
+from tendonfmu.recordings.entry_types import RoutingEntry
 from tendonfmu.report import MotionShown, PushShown, diagnosis_page, write_diagnosis
 from tendonfmu.tasks import FOLDER, Phases, PhaseState, Steps, digest_of, digest_of_file
 
@@ -144,7 +145,7 @@ class _Case:
     judged: Judged
     pushes: list[Path]
     sentences: list[str]
-    routing: dict[str, Any] | None  # what was learned of it; None if it is as described
+    routing: RoutingEntry | None  # what was learned of it; None if it is as described
 
     @property
     def tests(self) -> Sequence[FitRecording]:

@@ -23,7 +23,7 @@ from tendonfmu.detect.score_types import (
 from tendonfmu.detect.scoring import Scored, Track
 from tendonfmu.detect.summary import RocPoint, Summary
 from tendonfmu.files import finite
-from tendonfmu.files.json_types import Numbers
+from tendonfmu.files.json_types import Values
 from tendonfmu.recordings import LABEL
 from tendonfmu.statistics import Interval, intervals
 
@@ -164,7 +164,7 @@ def _interval(estimate: Interval) -> Pair:
     return None if math.isnan(estimate.low) or math.isnan(estimate.high) else [estimate.low, estimate.high]
 
 
-def _numbers(values: NDArray[np.float64] | None) -> Numbers | None:
+def _numbers(values: NDArray[np.float64] | None) -> Values | None:
     return None if values is None else [*values.tolist()]
 
 

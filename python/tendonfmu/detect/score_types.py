@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, TypedDict
 
-from tendonfmu.files.json_types import Count, Index, Kinematics, Number, Numbers, Schema, Share, Size
+from tendonfmu.files.json_types import Count, Index, Kinematics, Number, Schema, Share, Size, Values
 
 Pair = Annotated[list[float], Schema(minItems=2, maxItems=2)] | None
 
@@ -64,11 +64,11 @@ class Figures(TypedDict):
     held_share: Estimate  # Share of the found events that are held; exact binomial interval.
     overhang: Overhang
     at_alarm: AtAlarm
-    free_rms: Numbers  # N.m by joint; rms of the residual before the bias update in free time.
+    free_rms: Values  # N.m by joint; rms of the residual before the bias update in free time.
     free_rms_interval: list[Pair]  # Intervals of free_rms; blocks of 2 s resampled.
     # N.m by joint; rms of compensated minus external torque during events. null without external_torque or without an
     # event.
-    contact_torque_rms_error: Numbers | None
+    contact_torque_rms_error: Values | None
     contact_torque_rms_error_interval: list[Pair] | None  # Intervals of contact_torque_rms_error; events resampled.
     contact_torque_correlation: Estimates  # By joint, correlation of compensated and external torque during events.
     # By joint, slope of the regression of the compensated on the external torque, with an offset.
@@ -92,8 +92,8 @@ class ScoredEvent(TypedDict):
     held_share: Number  # Share of the samples from the alarm to the end that are contact.
     overhang_s: Size
     force: Number  # N, sensed force at the alarm.
-    external_torque: Numbers | None  # N.m by joint, at the alarm.
-    compensated_torque: Numbers | None  # N.m by joint, at the alarm.
+    external_torque: Values | None  # N.m by joint, at the alarm.
+    compensated_torque: Values | None  # N.m by joint, at the alarm.
 
 
 class FalseAlarm(TypedDict):

@@ -22,5 +22,5 @@ Count = Annotated[int, Schema(minimum=0)]
 Index = Annotated[int, Schema(minimum=1)]  # of a joint or tendon
 Text = Annotated[str, Schema(minLength=1)]
 Kinematics = Annotated[int, Schema(enum=[1, 2, 3])]
-Numbers = list[Number]
+Values = list[Number]
 Sizes = list[Size | None]

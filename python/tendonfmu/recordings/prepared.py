@@ -24,6 +24,7 @@ from tendonfmu.model import (
     velocity_threshold,
     watches_motors,
 )
+from tendonfmu.recordings.entry_types import RecordingEntry
 from tendonfmu.recordings.faults import SETTLING, gap_sentences, gaps, rate_sentences, silent_tendons, stuck_sensors
 from tendonfmu.recordings.recording import Recording, check_numbers
 from tendonfmu.recordings.residuals import Model, run_parts
@@ -102,7 +103,7 @@ class FitRecording:
         """Run a finger over the recording; its bias learns from the tracked samples."""
         return run_parts(data, self.recording.arrays(), self.parts, self.tracked, self.kinematics)
 
-    def entry(self) -> dict[str, Any]:
+    def entry(self) -> RecordingEntry:
         """Return what a report says about the recording."""
         return {
             "path": str(self.path),
