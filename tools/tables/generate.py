@@ -42,6 +42,7 @@ TEMPLATES = {
 }
 # Name of the schema -> module in the package, its class, and what the schema begins with.
 REPORTS = {
+    "diagnosis": ("report/diagnosis_types.py", "DiagnosisReport", {"title": "TendonFMU diagnosis"}),
     "fit_report": ("estimate/fit_types.py", "FitReport", {"title": "TendonFMU fit report"}),
     "score_report": ("detect/score_types.py", "ScoreReport", {"title": "TendonFMU score report"}),
     "tune_report": ("detect/tune_types.py", "TuneReport", {"title": "TendonFMU tune report"}),
