@@ -1,6 +1,6 @@
 """Writes every file that follows from the tables of facts in runtime/description: keys, effects and outputs.
 
-The page of a rig follows from its JSON Schema; the schemas of reports from classes of the package.
+The page and the schema of a rig follow from rig.json, the schemas of reports from classes of the package.
 
     python tools/tables/generate.py          writes the files that differ, and names them
     python tools/tables/generate.py --check  writes nothing; exit code 1 where a file differs
@@ -21,6 +21,7 @@ from facts import ROOT, Facts, Row, is_list, last, of, parent, plain, read_facts
 from finger_schema import DIALECT, documented, finger_schema, units_of
 from jinja2 import Environment, FileSystemLoader
 from rig_keys import rig_sections
+from rig_schema import rig_schema
 from typed_schema import PACKAGE, Module
 
 COMMAND = "python tools/tables/generate.py"
@@ -143,6 +144,12 @@ def json_text(value: Any, indent: str = "", width: int = WIDTH) -> str:
 
 def schema_text(facts: Facts) -> str:
     return json_text({"$comment": NOTICE} | finger_schema(facts)) + "\n"
+
+
+def rig_text(facts: Facts) -> str:
+    del facts
+    comment = f"Generated from tools/tables/rig.json by `{COMMAND}`: do not edit."
+    return json_text({"$comment": comment} | rig_schema(), width=2 * WIDTH) + "\n"
 
 
 def report_text(file: str, root: str, head: Row) -> str:
@@ -273,6 +280,7 @@ def generated(facts: Facts) -> dict[str, str]:
     makers: Mapping[str, Callable[[Facts], str]] = {
         "python/tendonfmu/schema/finger.schema.json": schema_text,
         "python/tendonfmu/schema/description_numbers.json": numbers_text,
+        "python/tendonfmu/schema/rig.schema.json": rig_text,
         "modelDescription/variables.json": variables_text,
     }
     files |= {path: make(facts) for path, make in makers.items()}

@@ -5,12 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-Schema = dict[str, Any]
+from finger_schema import Schema
+from rig_schema import rig_schema
 
-SCHEMA = Path(__file__).resolve().parents[2] / "python" / "tendonfmu" / "schema" / "rig.schema.json"
 SECTIONS = {  # title: where its keys begin; a key belongs to the longest of these
     "The file": "",
     "Physics: links, tendons, motors": "physics.",
@@ -38,7 +37,7 @@ class RigKey:
 
 def rig_sections() -> dict[str, list[RigKey]]:
     """Title -> rows, in the order of the schema."""
-    schema = json.loads(SCHEMA.read_text(encoding="utf-8"))
+    schema = rig_schema()
     sections: dict[str, list[RigKey]] = {title: [] for title in SECTIONS}
     for key in _keys(schema, "", schema["then"]):
         title = max((name for name in SECTIONS if key.path.startswith(SECTIONS[name])), key=lambda n: len(SECTIONS[n]))
@@ -48,8 +47,7 @@ def rig_sections() -> dict[str, list[RigKey]]:
 
 def _keys(schema: Schema, prefix: str, without_base: Schema) -> Iterator[RigKey]:
     """The keys of an object, and of the objects in it. without_base: what a rig without `base` needs besides."""
-    also = without_base.get("then", {}).get("required", []) if "if" in without_base else []
-    required = {*schema.get("required", ()), *without_base.get("required", ()), *(also if prefix == "pushes." else ())}
+    required = {*schema.get("required", ()), *without_base.get("required", ())}
     for key, inner in schema.get("properties", {}).items():
         path = prefix + key
         default = "required" if key in required else _word(inner["default"]) if "default" in inner else ""

@@ -16,9 +16,9 @@ Names = Annotated[list[str | None], Schema(minItems=1)]
 EFFECTS = (  # those of diagnosis/effects/table.py, of kinematics, and what is no effect
     "viscous_friction", "stribeck", "asymmetric_friction", "edge_friction", "pulley_friction", "joint_friction",
     "joint_load_friction", "preload_friction", "load_friction", "cover_stiffness", "cover_hardening", "gravity",
-    "inertia", "inertia_variation", "presliding", "relaxation", "cord_stretch", "friction_drift", "force_gain", "force_offset",
-    "time_delay", "moment_arm", "calibration", "moment_arm_variation", "pulley_eccentricity", "tendon_nonlinearity",
-    "joint_coupling", "backlash", "encoder_offset", "zero", "contact", "unknown",
+    "inertia", "inertia_variation", "presliding", "relaxation", "cord_stretch", "friction_drift", "force_gain",
+    "force_offset", "time_delay", "moment_arm", "calibration", "moment_arm_variation", "pulley_eccentricity",
+    "tendon_nonlinearity", "joint_coupling", "backlash", "encoder_offset", "zero", "contact", "unknown",
 )  # fmt: skip
 Effect = Annotated[str, Schema(enum=EFFECTS)]
 
