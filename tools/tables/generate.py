@@ -43,6 +43,7 @@ TEMPLATES = {
 }
 # Name of the schema -> module in the package, its class, and what the schema begins with.
 REPORTS = {
+    "hand": ("commands/hand/hand_types.py", "HandFile", {"title": "TendonFMU hand"}),
     "diagnosis": ("report/diagnosis_types.py", "DiagnosisReport", {"title": "TendonFMU diagnosis"}),
     "fit_report": ("estimate/fit_types.py", "FitReport", {"title": "TendonFMU fit report"}),
     "score_report": ("detect/score_types.py", "ScoreReport", {"title": "TendonFMU score report"}),

@@ -15,7 +15,8 @@ from markupsafe import Markup
 
 from tendonfmu import report as reporting
 from tendonfmu.calibration import text
-from tendonfmu.commands.hand.description import WRIST, Hand, HandPart
+from tendonfmu.commands.hand.description import Hand, HandPart
+from tendonfmu.commands.hand.hand_types import WRIST
 from tendonfmu.commands.score import ScoreResult
 from tendonfmu.diagnosis import History, Names
 from tendonfmu.files import counted, html_template, listed, percent, write_text
