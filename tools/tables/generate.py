@@ -43,6 +43,7 @@ TEMPLATES = {
 }
 # Name of the schema -> module in the package, its class, and what the schema begins with.
 REPORTS = {
+    "map": ("recordings/converters/map_types.py", "Map", {"title": "TendonFMU map of columns"}),
     "hand": ("commands/hand/hand_types.py", "HandFile", {"title": "TendonFMU hand"}),
     "diagnosis": ("report/diagnosis_types.py", "DiagnosisReport", {"title": "TendonFMU diagnosis"}),
     "fit_report": ("estimate/fit_types.py", "FitReport", {"title": "TendonFMU fit report"}),

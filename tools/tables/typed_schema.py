@@ -64,7 +64,10 @@ class Module:
         if of in KINDS:
             return {"type": KINDS[of]}
         if origin is Annotated:
-            return self._of(parts[0], defs) | {key: value for part in parts[1:] for key, value in part.items()}
+            found = self._of(parts[0], defs)
+            for part in parts[1:]:
+                found |= self._plain(part, defs)
+            return found
         if origin is Literal:
             return {"const": parts[0]} if len(parts) == 1 else {"enum": list(parts)}
         if origin is list:
@@ -78,6 +81,14 @@ class Module:
             defs[of.__name__] = {}  # it may hold itself
             defs[of.__name__] = self._object(of.__name__, defs)
         return {"$ref": of.__name__}
+
+    def _plain(self, value: Any, defs: dict[str, Schema]) -> Any:
+        """What a `Schema` says, with the types in it as schemas."""
+        if isinstance(value, dict):
+            return {key: self._plain(each, defs) for key, each in value.items()}
+        if isinstance(value, list | tuple):
+            return type(value)(self._plain(each, defs) for each in value)
+        return value if value is None or isinstance(value, str | float | int) else self._of(value, defs)
 
     def _object(self, name: str, defs: dict[str, Schema]) -> Schema:
         properties: dict[str, Schema] = {}
@@ -101,13 +112,14 @@ class Module:
     def _keys(self, name: str) -> Iterator[tuple[str, Any, str]]:
         """(key, type, comment), those of the bases first."""
         node, lines = self._classes[name]
+        optional = any(keyword.arg == "total" for keyword in node.keywords)
         for base in node.bases:
             if isinstance(base, ast.Name) and base.id != "TypedDict":
                 yield from self._keys(base.id)
         for part in node.body:
             if isinstance(part, ast.AnnAssign) and isinstance(part.target, ast.Name):
                 of = eval(compile(ast.Expression(part.annotation), name, "eval"), self._names)
-                yield part.target.id, of, _comment(lines, part)
+                yield part.target.id, NotRequired[of] if optional else of, _comment(lines, part)
 
 
 def _comment(lines: list[str], part: ast.AnnAssign) -> str:
