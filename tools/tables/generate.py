@@ -17,7 +17,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from facts import ROOT, Facts, Row, is_list, last, of, parent, plain, read_facts, symbol
+from facts import ROOT, Facts, Row, is_list, last, of, parent, plain, range_of, read_facts, symbol
 from finger_schema import DIALECT, documented, finger_schema, units_of
 from jinja2 import Environment, FileSystemLoader
 from rig_keys import rig_sections
@@ -145,7 +145,7 @@ def json_text(value: Any, indent: str = "", width: int = WIDTH) -> str:
 
 
 def schema_text(facts: Facts) -> str:
-    return json_text({"$comment": NOTICE} | finger_schema(facts)) + "\n"
+    return json_text({"$comment": NOTICE} | finger_schema(facts), width=2 * WIDTH) + "\n"
 
 
 def rig_text(facts: Facts) -> str:
@@ -246,18 +246,6 @@ def environment(facts: Facts) -> Environment:
         "rig_sections": rig_sections(),
     }
     return made
-
-
-def range_of(row: Row) -> str:
-    """`0 to 1e9`, `above 0 to 1e12`, `±1000`."""
-    least, most = row.get("least", row.get("above")), row["most"]
-    if "least" in row and least == -most:
-        return f"±{_plain_number(most)}"
-    return f"{'above ' if 'above' in row else ''}{_plain_number(least)} to {_plain_number(most)}"
-
-
-def _plain_number(value: float) -> str:
-    return f"{value:g}".replace("e+0", "e").replace("e-0", "e-").replace("-", "−" if "e" not in f"{value:g}" else "-")
 
 
 def pages(facts: Facts) -> list[tuple[Row, list[Row]]]:

@@ -8,7 +8,6 @@ of some `words`, an object, a list of objects (`kind`; `item` is the text of one
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 
 from facts import Row, last
@@ -18,8 +17,7 @@ TABLE = Path(__file__).with_name("rig.json")
 
 
 def rig_schema() -> Schema:
-    table = json.loads(TABLE.read_text(encoding="utf-8"))
-    rows = list(_rows(table))
+    table, rows = _table(), rig_rows()
     schema = _object(rows, "", {"text": table["description"], "required": True})
     motion = schema["properties"]["motion"]
     motion["allOf"] = [_motion(kind, keys) for kind, keys in table["motions"].items()]
@@ -36,24 +34,27 @@ def rig_schema() -> Schema:
         "required": ["format"],
         "if": {"not": {"required": ["base"], "properties": {"base": {"type": "string"}}}},
         "then": needed,
-        "properties": {"format": {"const": "tendonfmu-rig-1"}, **schema["properties"]},
     }
 
 
-def _rows(table: Row) -> Iterator[Row]:
-    """The rows, those of `{signal}` once for each signal, before what one signal has besides."""
-    keys = table["keys"]
-    of_signal = [row for row in keys if "{signal}" in row["path"]]
-    own = [row for row in keys if any(f".{signal}." in row["path"] for signal in table["signals"])]
-    for row in keys:
-        if row is of_signal[0]:
-            for signal, unit in table["signals"].items():
-                for each in of_signal:
-                    words = {key: each[key].format(signal=signal, unit=unit) for key in ("path", "text")}
-                    yield each | words
-                yield from (each for each in own if f".{signal}." in each["path"])
-        elif row not in of_signal and row not in own:
-            yield row
+def _table() -> Row:
+    table: Row = json.loads(TABLE.read_text(encoding="utf-8"))
+    return table
+
+
+def rig_rows() -> list[Row]:
+    """The rows in the order of the page: those of `{signal}` once for each signal that they are for."""
+    table = _table()
+    rows = table["keys"]
+    first = next(place for place, row in enumerate(rows) if "{signal}" in row["path"])
+    end = next(place for place, row in enumerate(rows) if place > first and "{signal}" not in row["path"])
+    of_signals = [
+        row | {key: row[key].format(signal=signal, unit=unit) for key in ("path", "text")}
+        for signal, unit in table["signals"].items()
+        for row in rows[first:end]
+        if signal in row.get("signals", table["signals"])
+    ]
+    return [*rows[:first], *of_signals, *rows[end:]]
 
 
 def _motion(kind: str, keys: list[str]) -> Schema:
@@ -88,10 +89,10 @@ def _object(rows: list[Row], path: str, row: Row) -> Schema:
 
 
 def _of_key(rows: list[Row], row: Row) -> Schema:
-    described = {"description": row["text"]} | ({"default": row["default"]} if "default" in row else {})
-    kind, optional, length = row.get("kind"), "required" not in row, row.get("length")
+    described: Schema = {"description": row["text"]} | ({"default": row["default"]} if "default" in row else {})
+    kind, optional, length = row.get("kind"), "required" not in row, row.get("length", 0)
     if "schema" in row:
-        return row["schema"] | described
+        return {**row["schema"], **described}
     if kind == "object":
         return _object(rows, row["path"], row)
     if kind == "list":

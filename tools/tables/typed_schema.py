@@ -66,7 +66,7 @@ class Module:
         if origin is Annotated:
             found = self._of(parts[0], defs)
             for part in parts[1:]:
-                found |= self._plain(part, defs)
+                found |= {} if part is NotRequired else self._plain(part, defs)
             return found
         if origin is Literal:
             return {"const": parts[0]} if len(parts) == 1 else {"enum": list(parts)}
@@ -94,10 +94,8 @@ class Module:
         properties: dict[str, Schema] = {}
         optional = set()
         for key, of, said in self._keys(name):
-            metadata = getattr(of, "__metadata__", ())
-            if NotRequired in metadata:
+            if NotRequired in getattr(of, "__metadata__", ()):
                 optional.add(key)
-                of = of.__origin__ if len(metadata) == 1 else Annotated[(of.__origin__, *metadata[:-1])]
             properties[key] = ({"description": said} if said else {}) | self._of(of, defs)
         doc = " ".join((ast.get_docstring(self._classes[name][0]) or "").split())
         required = [key for key in properties if key not in optional]
