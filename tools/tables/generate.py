@@ -22,7 +22,7 @@ from finger_schema import DIALECT, documented, finger_schema, units_of
 from jinja2 import Environment, FileSystemLoader
 from rig_keys import rig_sections
 from rig_schema import rig_schema
-from typed_schema import PACKAGE, Module
+from typed_schema import Types
 
 COMMAND = "python tools/tables/generate.py"
 NOTICE = f"Generated from the tables in runtime/description by `{COMMAND}`: do not edit."
@@ -41,14 +41,14 @@ TEMPLATES = {
     "fmu_variables.md.jinja": "docs/reference/fmu_variables.md",
     "rig.md.jinja": "docs/reference/rig.md",
 }
-# Name of the schema -> module in the package, its class, and what the schema begins with.
-REPORTS = {
-    "map": ("recordings/converters/map_types.py", "Map", {"title": "TendonFMU map of columns"}),
-    "hand": ("commands/hand/hand_types.py", "HandFile", {"title": "TendonFMU hand"}),
-    "diagnosis": ("report/diagnosis_types.py", "DiagnosisReport", {"title": "TendonFMU diagnosis"}),
-    "fit_report": ("estimate/fit_types.py", "FitReport", {"title": "TendonFMU fit report"}),
-    "score_report": ("detect/score_types.py", "ScoreReport", {"title": "TendonFMU score report"}),
-    "tune_report": ("detect/tune_types.py", "TuneReport", {"title": "TendonFMU tune report"}),
+# Name of the schema -> its title, its class, and modules of the package: that of the class is the last.
+TYPED = {
+    "map": ("TendonFMU map of columns", "Map", "recordings/converters/map_types.py"),
+    "hand": ("TendonFMU hand", "HandFile", "commands/hand/hand_types.py"),
+    "diagnosis": ("TendonFMU diagnosis", "DiagnosisReport", "report/diagnosis_types.py"),
+    "fit_report": ("TendonFMU fit report", "FitReport", "recordings/entry_types.py", "estimate/fit_types.py"),
+    "score_report": ("TendonFMU score report", "ScoreReport", "detect/score_types.py"),
+    "tune_report": ("TendonFMU tune report", "TuneReport", "detect/tune_types.py"),
 }
 
 
@@ -154,11 +154,11 @@ def rig_text(facts: Facts) -> str:
     return json_text({"$comment": comment} | rig_schema(), width=2 * WIDTH) + "\n"
 
 
-def report_text(file: str, root: str, head: Row) -> str:
+def typed_text(title: str, name: str, *files: str) -> str:
     """The JSON Schema of a class of the package."""
-    comment = f"Generated from python/tendonfmu/{file} by `{COMMAND}`: do not edit."
-    begin = {"$comment": comment, "$schema": DIALECT, **head}
-    return json_text(Module(PACKAGE / file).schema(root, begin), width=2 * WIDTH) + "\n"
+    comment = f"Generated from python/tendonfmu/{files[-1]} by `{COMMAND}`: do not edit."
+    begin = {"$comment": comment, "$schema": DIALECT, "title": title}
+    return json_text(Types(*files).schema(name, begin), width=2 * WIDTH) + "\n"
 
 
 def numbers_text(facts: Facts) -> str:
@@ -274,7 +274,7 @@ def generated(facts: Facts) -> dict[str, str]:
         "modelDescription/variables.json": variables_text,
     }
     files |= {path: make(facts) for path, make in makers.items()}
-    return files | {f"python/tendonfmu/schema/{name}.schema.json": report_text(*of) for name, of in REPORTS.items()}
+    return files | {f"python/tendonfmu/schema/{name}.schema.json": typed_text(*of) for name, of in TYPED.items()}
 
 
 def differing(files: Mapping[str, str], root: Path = ROOT) -> list[str]:

@@ -1,6 +1,6 @@
 """The JSON Schema of reports and other files, from the classes that the package has of them.
 
-Their modules are read, not imported: they hold TypedDicts and types made of those of `tendonfmu.files.json_types`.
+Their modules are read, not imported: they hold TypedDicts and types made of those of `tendonfmu.json_types`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ import collections.abc
 import types
 import typing
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from facts import ROOT
@@ -28,27 +27,19 @@ class NotRequired:
         return Annotated[inner, NotRequired]
 
 
-class Module:
-    """The classes and types of a module."""
+class Types:
+    """The classes and types of modules, each of which may use those before it."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, *files: str) -> None:
         self._names: dict[str, Any] = {"NotRequired": NotRequired}
         self._classes: dict[str, tuple[ast.ClassDef, list[str]]] = {}  # by name, with the lines of its file
-        self._read(path)
-
-    def _read(self, path: Path) -> None:
-        """Read a module, after those of the package that it imports."""
-        text = path.read_text(encoding="utf-8")
-        tree = ast.parse(text)
-        for node in list(tree.body):
-            module = node.module or "" if isinstance(node, ast.ImportFrom) else ""
-            if module.startswith("tendonfmu."):
-                self._read(PACKAGE.parent / f"{module.replace('.', '/')}.py")
-            if module.startswith("tendonfmu.") or isinstance(node, ast.If):  # under TYPE_CHECKING
-                tree.body.remove(node)
-        exec(compile(tree, str(path), "exec"), self._names)
-        lines = text.splitlines()
-        self._classes |= {node.name: (node, lines) for node in tree.body if isinstance(node, ast.ClassDef)}
+        for path in (PACKAGE / file for file in ("json_types.py", *files)):
+            text = path.read_text(encoding="utf-8")
+            tree = ast.parse(text)
+            tree.body = [node for node in tree.body if not isinstance(node, ast.If) and not _is_own(node)]
+            exec(compile(tree, str(path), "exec"), self._names)
+            lines = text.splitlines()
+            self._classes |= {node.name: (node, lines) for node in tree.body if isinstance(node, ast.ClassDef)}
 
     def schema(self, root: str, head: Schema) -> Schema:
         """The schema of a class or type; `head` comes before its keys."""
@@ -118,6 +109,11 @@ class Module:
             if isinstance(part, ast.AnnAssign) and isinstance(part.target, ast.Name):
                 of = eval(compile(ast.Expression(part.annotation), name, "eval"), self._names)
                 yield part.target.id, NotRequired[of] if optional else of, _comment(lines, part)
+
+
+def _is_own(node: ast.stmt) -> bool:
+    """Whether it imports from the package: what is read before has it."""
+    return isinstance(node, ast.ImportFrom) and (node.module or "").startswith("tendonfmu.")
 
 
 def _comment(lines: list[str], part: ast.AnnAssign) -> str:

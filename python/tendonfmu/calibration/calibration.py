@@ -53,6 +53,7 @@ from tendonfmu.recordings import (
     FitRecording,
     Held,
     Recording,
+    RoutingEntry,
     admit,
     learn_routing,
     prepare,
@@ -61,7 +62,6 @@ from tendonfmu.recordings import (
     routed,
     routing_entry,
 )
-from tendonfmu.recordings.entry_types import RoutingEntry
 from tendonfmu.report import MotionShown, PushShown, diagnosis_page, write_diagnosis
 from tendonfmu.tasks import FOLDER, Phases, PhaseState, Steps, digest_of, digest_of_file
 

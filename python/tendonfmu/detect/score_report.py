@@ -23,7 +23,7 @@ from tendonfmu.detect.score_types import (
 from tendonfmu.detect.scoring import Scored, Track
 from tendonfmu.detect.summary import RocPoint, Summary
 from tendonfmu.files import finite
-from tendonfmu.files.json_types import Values
+from tendonfmu.json_types import Values
 from tendonfmu.recordings import LABEL
 from tendonfmu.statistics import Interval, intervals
 

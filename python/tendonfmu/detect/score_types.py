@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, TypedDict
 
-from tendonfmu.files.json_types import Count, Index, Kinematics, Number, Schema, Share, Size, Values
+from tendonfmu.json_types import Count, Index, Kinematics, Number, Schema, Share, Size, Values
 
 Pair = Annotated[list[float], Schema(minItems=2, maxItems=2)] | None
 

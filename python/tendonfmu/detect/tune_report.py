@@ -10,7 +10,7 @@ import numpy as np
 from tendonfmu.detect.tune_types import AtFactor, AtPretension, KeptOut, Rates, TunedSensors, TuneReport
 from tendonfmu.detect.tuning import SURE, WITHIN, ContactTuning
 from tendonfmu.files import finite
-from tendonfmu.files.json_types import Sizes
+from tendonfmu.json_types import Sizes
 from tendonfmu.statistics import intervals
 
 FORMAT: Final = "tendonfmu-tune-2"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, TypedDict
 
-from tendonfmu.files.json_types import Count, Kinematics, Schema, Share, Size, Sizes
+from tendonfmu.json_types import Count, Kinematics, Schema, Share, Size, Sizes
 
 
 class Rates(TypedDict):

@@ -26,10 +26,9 @@ from tendonfmu.estimate.fit_types import (
 from tendonfmu.estimate.learning import Learned, unknown_names
 from tendonfmu.estimate.verdicts import CAUSES, Fitted
 from tendonfmu.files import counted, finite
-from tendonfmu.files.json_types import Values
+from tendonfmu.json_types import Values
 from tendonfmu.model import Effect, Finger, Instance, Law, native, without_friction
-from tendonfmu.recordings import FitRecording, Model, consistency, rms, whiteness
-from tendonfmu.recordings.entry_types import RoutingEntry
+from tendonfmu.recordings import FitRecording, Model, RoutingEntry, consistency, rms, whiteness
 from tendonfmu.statistics import effective_samples
 
 # --- one recording under a finger -------------------------------------------------------------------------------------

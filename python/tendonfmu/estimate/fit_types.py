@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict
 
-from tendonfmu.files.json_types import Count, Index, Number, Schema, Size, Values
-from tendonfmu.recordings.entry_types import Nis, RecordingEntry, RoutingEntry, Whiteness
+from tendonfmu.json_types import Count, Index, Number, Schema, Size, Values
+from tendonfmu.recordings import Nis, RecordingEntry, RoutingEntry, Whiteness
 
 if TYPE_CHECKING:
     from typing_extensions import NotRequired

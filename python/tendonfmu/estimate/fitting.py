@@ -49,6 +49,7 @@ from tendonfmu.recordings import (
     FitRecording,
     Held,
     RecordingSource,
+    RoutingEntry,
     admit,
     listed_sources,
     motion_of,
@@ -63,7 +64,6 @@ from tendonfmu.recordings import (
     slack_sentences,
     without_rests,
 )
-from tendonfmu.recordings.entry_types import RoutingEntry
 
 METHODS = {"batch": (learn_batch, 60), "ekf": (learn_ekf, 2)}  # and the default of `passes`
 SIDES = {"given": None, "symmetric": False, "asymmetric": True}  # as reports say it -> `asymmetric`

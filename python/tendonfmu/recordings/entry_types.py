@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, TypedDict
 
-from tendonfmu.files.json_types import Count, Index, Kinematics, Number, Schema, Size, Values
+from tendonfmu.json_types import Count, Index, Kinematics, Number, Schema, Size, Values
 
 
 class RecordingEntry(TypedDict):

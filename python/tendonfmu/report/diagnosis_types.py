@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict
 
-from tendonfmu.files.json_types import Count, Index, Number, Schema, Share, Size, Values
+from tendonfmu.json_types import Count, Index, Number, Schema, Share, Size, Values
 
 if TYPE_CHECKING:
     from typing_extensions import NotRequired

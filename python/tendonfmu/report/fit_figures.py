@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from tendonfmu import drawing as draw
 from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.drawing import panel
-from tendonfmu.estimate import FitPicture, FitSeries, identifiability
-from tendonfmu.estimate.fit_types import FittedNumber
+from tendonfmu.estimate import FitPicture, FitSeries, FittedNumber, identifiability
 from tendonfmu.recordings import flagged_stretches
 from tendonfmu.report.fit_laws import law_sheets
 from tendonfmu.report.numbers import rms, torque_unit

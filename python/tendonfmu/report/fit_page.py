@@ -6,11 +6,10 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from tendonfmu.estimate import FitPicture, verdicts
-from tendonfmu.estimate.fit_types import FitReport, FittedNumber
+from tendonfmu.estimate import FitPicture, FitReport, FittedNumber, verdicts
 from tendonfmu.files import write_text
 from tendonfmu.model import part_of
-from tendonfmu.recordings.entry_types import RecordingEntry
+from tendonfmu.recordings import RecordingEntry
 from tendonfmu.report import fit_text as text
 from tendonfmu.report.fit_figures import fit_sheets, strongest_pairs
 from tendonfmu.report.numbers import Row, percent, unit_text

@@ -7,8 +7,17 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from tendonfmu.estimate import FitPicture, Fitted, FrictionFit, identifiability, known_numbers, verdicts
-from tendonfmu.estimate.fit_types import Comparison, FitReport, ResidualRms
+from tendonfmu.estimate import (
+    Comparison,
+    FitPicture,
+    FitReport,
+    Fitted,
+    FrictionFit,
+    ResidualRms,
+    identifiability,
+    known_numbers,
+    verdicts,
+)
 from tendonfmu.files import are, counted
 from tendonfmu.model import Finger, effects
 from tendonfmu.report.numbers import Row, Table, column, percent, rounded, together, torque_unit

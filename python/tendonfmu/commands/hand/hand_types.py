@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Literal, TypedDict
 
-from tendonfmu.files.json_types import Schema, Text
+from tendonfmu.json_types import Schema, Text
 
 if TYPE_CHECKING:
     from typing_extensions import NotRequired
