@@ -33,7 +33,7 @@ class At(TypedDict):
     tendon: Index | None
 
 
-class Where(At):
+class WhereEntry(At):
     effect: Effect
 
 
@@ -59,18 +59,18 @@ class Delivered(TypedDict):
     extended: Errors
 
 
-class Place(At):
+class PlaceEntry(At):
     parameters: Mapping[str, Number]
     units: Mapping[str, str]
     intervals: Mapping[str, Ends]
 
 
-class OffSensor(Where):
+class OffSensor(WhereEntry):
     correction: Gain  # What the description has to add, with its 95 % interval.
     unit: str
 
 
-class Evidence(TypedDict):
+class EvidenceEntry(TypedDict):
     joint: Index
     label: str
     unit: str
@@ -83,19 +83,19 @@ class Evidence(TypedDict):
     reference_std: NotRequired[Values]
 
 
-class Cause(Where):
+class CauseEntry(WhereEntry):
     p_value: Share | None  # p-value, family-wise over all effects and places.
     gain: Gain  # Gain of this cause on the test data, with the other causes in the model.
     # Unit of the rms that the gain is a share of: of the torque, or of the tendons' positions (moment_arm,
     # tendon_nonlinearity, joint_coupling, zero and encoder_offset, where positions and encoders show them).
     gain_unit: Annotated[str, Schema(enum=["N.m", "m"])]
-    confusable_with: list[Where]  # Effects that the data cannot distinguish from this one.
+    confusable_with: list[WhereEntry]  # Effects that the data cannot distinguish from this one.
     # Numbers of the cause in extended.json, by path; of encoder_offset, by column: what the encoder reads too much,
     # which no description holds.
     parameters: Mapping[str, Number]
     units: Mapping[str, str]  # Units of the parameters.
     intervals: Mapping[str, Ends]  # 95 % intervals of the parameters that the data determine.
-    places: list[Place]  # Places of the effect; one effect at several places is one cause.
+    places: list[PlaceEntry]  # Places of the effect; one effect at several places is one cause.
     # Of calibration: what each sensor is off by. Effect calibration stands for force gain and moment arm together.
     sensors: NotRequired[list[OffSensor]]
     size: str  # Size of the cause in words.
@@ -110,14 +110,14 @@ class Cause(Where):
     title: str
     explanation: str
     # Mean residual (N·m) over the coordinate of the effect, without and with the effect in the model.
-    evidence: list[Evidence]
+    evidence: list[EvidenceEntry]
 
 
-class UncertainCause(Cause):
+class UncertainCause(CauseEntry):
     experiment: str  # The recording that would settle it.
 
 
-class Unexplained(TypedDict):
+class UnexplainedEntry(TypedDict):
     """What no effect explains; share is its part of the residual variance above the noise floor."""
 
     share: Number
@@ -138,7 +138,7 @@ class WhitenessOfJoint(TypedDict):
     extended: Number
 
 
-class InvisibleEffect(Where):
+class InvisibleEffect(WhereEntry):
     title: str
     surviving_share: Number  # Share of the variance of the effect that remains after refitting the nominal model.
     # 1 - rms ratio that correcting an effect of ordinary size would bring on these data; null for a change.
@@ -161,8 +161,8 @@ class NextExperiment(TypedDict):
     """The next experiment; `tendonfmu excite --discriminate DIR` writes its motion."""
 
     sentence: str
-    separates: list[Annotated[list[Where], Schema(minItems=2, maxItems=2)]]
-    makes_visible: list[Where]
+    separates: list[Annotated[list[WhereEntry], Schema(minItems=2, maxItems=2)]]
+    makes_visible: list[WhereEntry]
     distance: Number  # Difference between the predictions, relative to the noise.
     motion: Mapping[str, Any]  # How the motion is made.
 
@@ -214,11 +214,13 @@ class DiagnosisReport(TypedDict):
     gain: Gain  # 1 - rms_extended/rms_nominal over all joints on the test data.
     # In order of gain; contact and unknown, which have no term in the model, come last. The interval of each gain is
     # above 0.
-    causes: list[Cause]
-    too_small: list[Cause]  # Effects that are visible, but too small to matter. They are not in the extended model.
+    causes: list[CauseEntry]
+    too_small: list[
+        CauseEntry
+    ]  # Effects that are visible, but too small to matter. They are not in the extended model.
     # Effects that are significant, but whose gain on the test data may be 0. They are not in the extended model.
     uncertain: list[UncertainCause]
-    unexplained: Unexplained
+    unexplained: UnexplainedEntry
     next_experiment: str  # The next experiment in a sentence.
     # Error over all joints on the test data: of the nominal model, then after adding each cause that has a term.
     waterfall: Annotated[list[Step], Schema(minItems=1)]

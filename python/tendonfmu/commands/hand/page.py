@@ -107,7 +107,7 @@ def calibration_rows(hand: Hand, results: Sequence[PartResult]) -> list[PartRow]
 def diagnosis_rows(hand: Hand, results: Sequence[PartResult]) -> list[PartRow]:
     """Return a row for each finger: verdict, causes, error, and how much of it is beyond noise."""
 
-    def row(result: PartResult, report: Report) -> PartRow:
+    def row(result: PartResult, report: reporting.DiagnosisReport) -> PartRow:
         adequate = report["verdict"] == "adequate"
         wrong = share_that_is_wrong(report)
         causes = [" ".join(filter(None, (cause["title"], _place(result, cause)))) for cause in report["causes"]]
@@ -197,10 +197,10 @@ def score_rows(scores: Mapping[str, ScoreResult], failed: Mapping[str, str]) -> 
     return sorted(rows, key=lambda row: -row.badness)
 
 
-def share_that_is_wrong(report: Report) -> float:
+def share_that_is_wrong(report: reporting.DiagnosisReport) -> float:
     """Return the share of a finger's error that is more than noise: what causes explain, and what nothing does."""
-    gain, unexplained = report["gain"]["value"], report["unexplained"]["share"]
-    return float(1.0 - (1.0 - gain) * math.sqrt(max(1.0 - unexplained, 0.0)))
+    gain, unexplained = report["gain"]["value"] or 0.0, report["unexplained"]["share"] or 0.0
+    return 1.0 - (1.0 - gain) * math.sqrt(max(1.0 - unexplained, 0.0))
 
 
 def shared_warnings(warnings: Mapping[str, Sequence[str]]) -> list[str]:
@@ -215,7 +215,7 @@ def shared_warnings(warnings: Mapping[str, Sequence[str]]) -> list[str]:
 # --- parts ------------------------------------------------------------------------------------------------------------
 
 
-def _rows(results: Sequence[PartResult], row: Callable[[PartResult, Report], PartRow]) -> list[PartRow]:
+def _rows(results: Sequence[PartResult], row: Callable[[PartResult, Any], PartRow]) -> list[PartRow]:
     """Return the rows, worst first; those of failed parts come last."""
     done = [row(result, result.report) for result in results if result.report is not None]
     done.sort(key=lambda each: -each.badness)
@@ -236,7 +236,7 @@ def _mnm(value: float | None) -> str:
     return "–" if value is None else reporting.rounded(1e3 * value)
 
 
-def _place(result: PartResult, cause: Mapping[str, Any]) -> str:
+def _place(result: PartResult, cause: reporting.CauseEntry) -> str:
     """Return where a cause is, by the names of joint and tendon."""
     finger = result.part.finger
     words = [f"at {finger.joint_names[cause['joint'] - 1]}"] if cause["joint"] else []
