@@ -215,9 +215,8 @@ class DiagnosisReport(TypedDict):
     # In order of gain; contact and unknown, which have no term in the model, come last. The interval of each gain is
     # above 0.
     causes: list[CauseEntry]
-    too_small: list[
-        CauseEntry
-    ]  # Effects that are visible, but too small to matter. They are not in the extended model.
+    # Effects that are visible, but too small to matter. They are not in the extended model.
+    too_small: list[CauseEntry]
     # Effects that are significant, but whose gain on the test data may be 0. They are not in the extended model.
     uncertain: list[UncertainCause]
     unexplained: UnexplainedEntry

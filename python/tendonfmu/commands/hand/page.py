@@ -227,9 +227,9 @@ def _rows(results: Sequence[PartResult], row: Callable[[PartResult, Any], PartRo
     ]
 
 
-def _own(hand: Hand, result: PartResult, values: Sequence[float]) -> float:
+def _own(hand: Hand, result: PartResult, values: Sequence[float | None]) -> float:
     """Return the rms of all joints of a finger together; a shared wrist is no joint of the finger."""
-    return reporting.together(values[hand.shared_joints(result.part) :])
+    return reporting.together(reporting.column(values[hand.shared_joints(result.part) :]))
 
 
 def _mnm(value: float | None) -> str:
