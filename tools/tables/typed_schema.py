@@ -148,6 +148,8 @@ def _with_single_ones_inside(schema: Schema) -> Schema:
         if not isinstance(node, dict):
             return node
         if names.count(node.get("$ref")) == 1:
+            twice = (defs[node["$ref"]].keys() & node.keys()) - {"description"}
+            assert not twice, f"{node['$ref']} has {twice} of its own"
             node = defs[node["$ref"]] | node
             node = {key: node[key] for key in sorted(node, key="description".__ne__) if key != "$ref"}
         elif "$ref" in node:
