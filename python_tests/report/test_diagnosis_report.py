@@ -18,6 +18,7 @@ from tendonfmu.diagnosis.sizes import size_of
 from tendonfmu.files import report_text
 from tendonfmu.report.diagnosis_files import build_report
 from tendonfmu.report.diagnosis_text import left_of, left_sentence, lines, tables, unit_of
+from tendonfmu.report.diagnosis_types import EFFECTS
 from tendonfmu.report.numbers import percent, percent_interval, probability
 from tendonfmu.statistics.intervals import Interval
 
@@ -187,8 +188,7 @@ def test_numbers_are_told_as_people_write_them() -> None:
     assert [probability(p) for p in (2.1e-7, 0.008, 1e-30, 1.0)] == ["2.1e-7", "0.008", "< 1e-12", "1"]
     large = ModelErrors((20.0, 3.0), (25.0, 3.0))
     assert unit_of(replace(examples.one_cause(), nominal=large)) == (1.0, "N·m")
-    effects = SCHEMA["$defs"]["effect"]["enum"]
-    assert not [effect for effect in effects if title_of(effect) in effects or "_" in title_of(effect)]
+    assert not [effect for effect in EFFECTS if title_of(effect) in EFFECTS or "_" in title_of(effect)]
 
 
 def test_the_terminal_shows_all_parts(full: Diagnosis) -> None:

@@ -131,11 +131,11 @@ def test_an_unsettled_fit_says_so_first(fit: FitPicture, change: dict[str, Any])
 
 def test_what_a_fit_does_not_know_is_left_out(fit: FitPicture) -> None:
     """No held-out data, no start, numbers that are null."""
-    train = {**fit.report["residual"]["train"], "bias_only_rms": [None]}
-    train.pop("start_rms")
-    innovations = {"nis": {"mean": None, "interval": [None, None], "consistent": False}}
-    innovations["whiteness"] = {"lag_one": [None], "ljung_box_p": [None]}
-    report = {**fit.report, "residual": {"train": train, "held_out": None}, "innovations": innovations}
+    train = {**fit.report["residual"]["train"], "bias_only_rms": [None], "start_rms": [None]}
+    nis = {"mean": None, "interval": [None, None], "consistent": False}
+    innovations = {**fit.report["innovations"], "nis": nis, "whiteness": {"lag_one": [None], "ljung_box_p": [None]}}
+    residual = {"train": train, "held_out": None, "comparisons": []}
+    report = {**fit.report, "residual": residual, "innovations": innovations}
     text = plain(fit_page(dataclasses.replace(fit, report=report)))
     assert "Held out of training" not in text and "nan" not in text.lower().split()
 

@@ -1,4 +1,4 @@
-"""What follows from the tables in runtime/description is what tools/tables/generate.py makes of them."""
+"""What follows from tables, and from classes of the package, is what tools/tables/generate.py makes of them."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_each_generated_file_says_so_in_its_first_line(generator: ModuleType) ->
     files = generator.generated(generator.read_facts())
     assert len(files) > 12
     for path, text in files.items():
-        assert generator.NOTICE in "".join(text.splitlines()[:2]), path
+        assert f"by `{generator.COMMAND}`: do not edit." in "".join(text.splitlines()[:2]), path
 
 
 def changed(generator: ModuleType, change: Callable[[Any], object]) -> set[str]:
@@ -78,6 +78,48 @@ def test_an_output_is_a_fact_of_one_table(generator: ModuleType) -> None:
 def test_the_size_of_an_effect_is_a_fact_of_one_table(generator: ModuleType) -> None:
     found = changed(generator, lambda facts: facts.effects["effects"][0]["numbers"][0].update(scale=0.06))
     assert found == {"python/tendonfmu/schema/description_numbers.json", "runtime/core/effects/effect_facts.c"}
+
+
+MADE = '''from typing import Annotated, Literal, TypedDict
+from tendonfmu.json_types import Count, Number, Schema
+
+class Part(TypedDict, total=False):
+    n: Count
+
+class Base(TypedDict):
+    kind: Literal["a"]
+
+class Whole(Base):
+    """The whole."""
+    # Two
+    # lines.
+    one: Annotated[Part, Schema(minProperties=1)]
+    two: NotRequired[dict[str, list[Part | None]]]  # Behind.
+    x: Number
+    y: Annotated[str, Schema(enum=["u"])] | None
+
+Root = Annotated[Whole, Schema({"not": {"properties": {"x": Base}}})]
+'''
+
+
+def test_a_class_is_a_schema(generator: ModuleType, tmp_path: Path) -> None:
+    """Bases, comments, what may be missing or null, a type in a schema, and a class that stands in two places."""
+    (tmp_path / "made_types.py").write_text(MADE, encoding="utf-8")
+    schema = json.loads(generator.typed_text("T", "Root", str(tmp_path / "made_types.py")))
+    assert schema["title"] == "T" and schema["description"] == "The whole."
+    assert schema["required"] == ["kind", "one", "x", "y"] and schema["additionalProperties"] is False
+    part = {"$ref": "#/$defs/Part"}
+    parts = {"type": "array", "items": {"anyOf": [part, {"type": "null"}]}}
+    assert schema["properties"] == {
+        "kind": {"const": "a"},
+        "one": {"description": "Two lines.", "minProperties": 1, **part},
+        "two": {"description": "Behind.", "type": "object", "additionalProperties": parts},
+        "x": {"type": ["number", "null"]},
+        "y": {"type": ["string", "null"], "enum": ["u", None]},
+    }
+    numbers = {"n": {"type": "integer", "minimum": 0}}
+    assert schema["$defs"] == {"Part": {"type": "object", "additionalProperties": False, "properties": numbers}}
+    assert schema["not"]["properties"]["x"]["properties"] == {"kind": {"const": "a"}}
 
 
 @pytest.mark.parametrize(

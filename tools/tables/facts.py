@@ -96,6 +96,21 @@ def of(text: str) -> str:
     return re.sub(r"\{(\w)\}", r"\1", text)
 
 
+def range_of(row: Row) -> str:
+    """`0 to 1e9`, `above 0 to 1e12`, `±1000`."""
+    least, most = row.get("least", row.get("above")), row["most"]
+    if "least" in row and least == -most:
+        return f"±{plain_number(most)}"
+    return f"{'above ' if 'above' in row else ''}{plain_number(least)} to {plain_number(most)}"
+
+
+def plain_number(value: float) -> str:
+    if value == 2**53:
+        return "2^53"
+    text = f"{value:g}"
+    return text.replace("e+0", "e").replace("e+", "e").replace("e-0", "e-") if "e" in text else text.replace("-", "−")
+
+
 def read_facts(folder: Path = FOLDER) -> Facts:
     """Raises ValueError naming the file and the row that cannot be."""
     keys, effects, outputs = (

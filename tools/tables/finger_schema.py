@@ -9,6 +9,7 @@ from facts import Facts, Row, is_list, last, of, plain, symbol
 
 Schema = dict[str, Any]
 
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
 NAME: Schema = {"type": "string", "minLength": 1, "maxLength": 200, "pattern": "^[^\\u0000-\\u001f\\u007f]*$"}
 NULL: Schema = {"type": "null"}
 LAW = "F(v) = sgn(v)·(coulomb + (static − coulomb)·exp(−|v|/stribeck_velocity) + viscous·|v|), static >= coulomb"
@@ -40,7 +41,7 @@ PLACES: Mapping[str, Schema] = {
 def finger_schema(facts: Facts) -> Schema:
     effects = facts.effects["effects"]
     schema = {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$schema": DIALECT,
         "$id": "urn:tendonfmu:finger-1",
         "title": "Finger description of TendonFMU",
         **_object(facts, facts.rows[0]),
@@ -72,12 +73,13 @@ def documented(row: Row) -> str:
     return text + (f"; {of(row['note'])}" if "note" in row else "")
 
 
-def _number(row: Row, nullable: bool) -> Schema:
+def number_of(row: Row, nullable: bool) -> Schema:
     lower = {"exclusiveMinimum": row["above"]} if "above" in row else {"minimum": row["least"]}
-    return {"type": ["number", "null"] if nullable else "number", **lower, "maximum": row["most"]}
+    kind = "integer" if "whole" in row else "number"
+    return {"type": [kind, "null"] if nullable else kind, **lower, "maximum": row["most"]}
 
 
-def _list(length: tuple[int, int], items: Schema, nullable: bool) -> Schema:
+def list_of(length: tuple[int, int], items: Schema, nullable: bool) -> Schema:
     return {
         "type": ["array", "null"] if nullable else "array",
         "minItems": length[0],
@@ -91,13 +93,13 @@ def _of_number(facts: Facts, row: Row) -> Schema:
     described = {"description": documented(row)}
     if not is_list(row):
         default = {"default": row["default"]} if "default" in row else {}
-        return described | _number(row, optional) | default
-    item = _number(row, "default" in row)
+        return described | number_of(row, optional) | default
+    item = number_of(row, "default" in row)
     if row["path"].endswith("[c]"):
         some = {"contains": {"not": {"const": 0}}} if row["item"] == "LINK_AXIS" else {}
-        return described | _list((3, 3), item, optional) | some
+        return described | list_of((3, 3), item, optional) | some
     most = limits["points"] if row["item"] == "EDGE_ANGLES" else limits["joints"]
-    return described | _list((1, most), item, optional)
+    return described | list_of((1, most), item, optional)
 
 
 def _of_key(facts: Facts, row: Row) -> Schema:
@@ -112,7 +114,7 @@ def _of_key(facts: Facts, row: Row) -> Schema:
         name = last(row["path"])
         most = limits.get(name, limits["joints"])
         items = {"$ref": f"#/$defs/{row['path'][:-1]}"}
-        return described | _list((most if name == "bands" else 1, most), items, "required" not in row)
+        return described | list_of((most if name == "bands" else 1, most), items, "required" not in row)
     if kind == "word":
         return {"enum": [*row["words"], None]} | described | {"default": row["words"][0]}
     if kind == "flag":
@@ -155,7 +157,7 @@ def _laws(facts: Facts) -> Schema:
     keys = [number["key"] for number in numbers]
     sides: list[Schema] = [
         {
-            **_number(number, "default" in number),
+            **number_of(number, "default" in number),
             "description": f"{number['text']}: {number['note']}",
             **({"default": number["default"]} if "default" in number else {}),
         }
@@ -193,7 +195,7 @@ def _laws(facts: Facts) -> Schema:
             "additionalProperties": False,
             "properties": {
                 "angles": _of_number(facts, angles),
-                "laws": _list((1, limits["points"]), {"$ref": "#/$defs/law"}, nullable=False),
+                "laws": list_of((1, limits["points"]), {"$ref": "#/$defs/law"}, nullable=False),
                 **dict.fromkeys([*keys, "positive", "negative"], NULL),
             },
         },
@@ -223,7 +225,7 @@ def _effect(facts: Facts, effect: Row) -> Schema:
     }
     numbers: Schema = {
         number["key"]: {
-            **_number(number, "default" in number),
+            **number_of(number, "default" in number),
             **({"default": number["default"]} if "default" in number else {}),
             "description": units_of(number) + (f"; {number['note']}" if "note" in number else ""),
         }

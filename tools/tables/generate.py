@@ -1,6 +1,6 @@
 """Writes every file that follows from the tables of facts in runtime/description: keys, effects and outputs.
 
-The page of a rig follows from its JSON Schema.
+The page and the schema of a rig follow from rig.json, the schemas of reports from classes of the package.
 
     python tools/tables/generate.py          writes the files that differ, and names them
     python tools/tables/generate.py --check  writes nothing; exit code 1 where a file differs
@@ -17,10 +17,12 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from facts import ROOT, Facts, Row, is_list, last, of, parent, plain, read_facts, symbol
-from finger_schema import documented, finger_schema, units_of
+from facts import ROOT, Facts, Row, is_list, last, of, parent, plain, range_of, read_facts, symbol
+from finger_schema import DIALECT, documented, finger_schema, units_of
 from jinja2 import Environment, FileSystemLoader
 from rig_keys import rig_sections
+from rig_schema import rig_schema
+from typed_schema import Types
 
 COMMAND = "python tools/tables/generate.py"
 NOTICE = f"Generated from the tables in runtime/description by `{COMMAND}`: do not edit."
@@ -38,6 +40,15 @@ TEMPLATES = {
     "description_keys.md.jinja": "docs/reference/description_keys.md",
     "fmu_variables.md.jinja": "docs/reference/fmu_variables.md",
     "rig.md.jinja": "docs/reference/rig.md",
+}
+# Name of the schema -> its title, its class, and modules of the package: that of the class is the last.
+TYPED = {
+    "map": ("TendonFMU map of columns", "Map", "recordings/converters/map_types.py"),
+    "hand": ("TendonFMU hand", "HandFile", "commands/hand/hand_types.py"),
+    "diagnosis": ("TendonFMU diagnosis", "DiagnosisReport", "report/diagnosis_types.py"),
+    "fit_report": ("TendonFMU fit report", "FitReport", "recordings/entry_types.py", "estimate/fit_types.py"),
+    "score_report": ("TendonFMU score report", "ScoreReport", "detect/score_types.py"),
+    "tune_report": ("TendonFMU tune report", "TuneReport", "detect/tune_types.py"),
 }
 
 
@@ -119,22 +130,35 @@ def option_of(row: Row, facts: Facts) -> str:
 WIDTH = 120
 
 
-def json_text(value: Any, indent: str = "") -> str:
+def json_text(value: Any, indent: str = "", width: int = WIDTH) -> str:
     """JSON with every list and object on one line that has room for it."""
     line = json.dumps(value, ensure_ascii=False)
-    if len(indent) + len(line) < WIDTH or not isinstance(value, (dict, list)):
+    if len(indent) + len(line) < width or not isinstance(value, (dict, list)):
         return line
     inner = indent + "  "
     if isinstance(value, list):
-        parts = [json_text(each, inner) for each in value]
+        parts = [json_text(each, inner, width) for each in value]
     else:
-        parts = [f"{json.dumps(key)}: {json_text(each, inner)}" for key, each in value.items()]
+        parts = [f"{json.dumps(key)}: {json_text(each, inner, width)}" for key, each in value.items()]
     begin, end = "[]" if isinstance(value, list) else "{}"
     return begin + "\n" + ",\n".join(inner + part for part in parts) + f"\n{indent}{end}"
 
 
 def schema_text(facts: Facts) -> str:
-    return json_text({"$comment": NOTICE} | finger_schema(facts)) + "\n"
+    return json_text({"$comment": NOTICE} | finger_schema(facts), width=2 * WIDTH) + "\n"
+
+
+def rig_text(facts: Facts) -> str:
+    del facts
+    comment = f"Generated from tools/tables/rig.json by `{COMMAND}`: do not edit."
+    return json_text({"$comment": comment} | rig_schema(), width=2 * WIDTH) + "\n"
+
+
+def typed_text(title: str, name: str, *files: str) -> str:
+    """The JSON Schema of a class of the package."""
+    comment = f"Generated from python/tendonfmu/{files[-1]} by `{COMMAND}`: do not edit."
+    begin = {"$comment": comment, "$schema": DIALECT, "title": title}
+    return json_text(Types(*files).schema(name, begin), width=2 * WIDTH) + "\n"
 
 
 def numbers_text(facts: Facts) -> str:
@@ -224,18 +248,6 @@ def environment(facts: Facts) -> Environment:
     return made
 
 
-def range_of(row: Row) -> str:
-    """`0 to 1e9`, `above 0 to 1e12`, `±1000`."""
-    least, most = row.get("least", row.get("above")), row["most"]
-    if "least" in row and least == -most:
-        return f"±{_plain_number(most)}"
-    return f"{'above ' if 'above' in row else ''}{_plain_number(least)} to {_plain_number(most)}"
-
-
-def _plain_number(value: float) -> str:
-    return f"{value:g}".replace("e+0", "e").replace("e-0", "e-").replace("-", "−" if "e" not in f"{value:g}" else "-")
-
-
 def pages(facts: Facts) -> list[tuple[Row, list[Row]]]:
     """(object, its keys), in the order of the page; objects within it come after it."""
     found = []
@@ -258,9 +270,11 @@ def generated(facts: Facts) -> dict[str, str]:
     makers: Mapping[str, Callable[[Facts], str]] = {
         "python/tendonfmu/schema/finger.schema.json": schema_text,
         "python/tendonfmu/schema/description_numbers.json": numbers_text,
+        "python/tendonfmu/schema/rig.schema.json": rig_text,
         "modelDescription/variables.json": variables_text,
     }
-    return files | {path: make(facts) for path, make in makers.items()}
+    files |= {path: make(facts) for path, make in makers.items()}
+    return files | {f"python/tendonfmu/schema/{name}.schema.json": typed_text(*of) for name, of in TYPED.items()}
 
 
 def differing(files: Mapping[str, str], root: Path = ROOT) -> list[str]:

@@ -53,6 +53,7 @@ from tendonfmu.recordings import (
     FitRecording,
     Held,
     Recording,
+    RoutingEntry,
     admit,
     learn_routing,
     prepare,
@@ -144,7 +145,7 @@ class _Case:
     judged: Judged
     pushes: list[Path]
     sentences: list[str]
-    routing: dict[str, Any] | None  # what was learned of it; None if it is as described
+    routing: RoutingEntry | None  # what was learned of it; None if it is as described
 
     @property
     def tests(self) -> Sequence[FitRecording]:
@@ -371,7 +372,7 @@ class _Run:
         scored = score_recordings(
             file, self._case.pushes, options, progress=lambda done, total: step(done / max(total, 1))
         )
-        report = detect_score_report.build_report(scored)
+        report: Mapping[str, Any] = detect_score_report.build_report(scored)
 
         def of(key: str) -> list[tuple[str, dict[str, Any]]]:
             return [(Path(each["path"]).name, row) for each in report["recordings"] for row in each[key]]

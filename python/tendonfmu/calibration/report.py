@@ -227,7 +227,7 @@ def left_out(events: Sequence[Event]) -> list[str]:
 
 def tuning_of(tuning: ContactTuning) -> dict[str, Any]:
     """Report the tuned bounds and their alarms."""
-    report = tune_report.build_report(tuning)
+    report: Mapping[str, Any] = tune_report.build_report(tuning)
     return {
         "finger": tuning.description_.data,
         "warnings": report["warnings"],

@@ -130,7 +130,7 @@ def tiles(report: Report) -> Iterator[tuple[str, str, str]]:
         f"in {_long(found['minutes'])}",
         f"false alarms in the same motion; at most {detection['false_alarms_per_hour']:g} an hour were asked for",
     )
-    least, joint = tune_report.least_sensitive({"joints": report["joints"], **detection})
+    least, joint = tune_report.least_sensitive(report["joints"], detection["pushes"]["torque"])
     within = 1e3 * detection["pushes"]["within_s"]
     yield (
         found_from(least),

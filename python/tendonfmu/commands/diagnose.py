@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +23,7 @@ from tendonfmu.options import DiagnoseOptions, RecordingSources, keywords
 if TYPE_CHECKING:
     from tendonfmu.diagnosis import Cause
     from tendonfmu.model import Finger, FingerSource
+    from tendonfmu.report import DiagnosisReport
     from tendonfmu.statistics import Interval
 
 
@@ -73,7 +73,7 @@ class Diagnosis(Result):
         return model.finger_from_data(self.found.nominal_data, Path("nominal"))
 
     @property
-    def report(self) -> Mapping[str, Any]:
+    def report(self) -> DiagnosisReport:
         """All results, as diagnosis.json has them."""
         return reporting.build_report(self.found, [])
 

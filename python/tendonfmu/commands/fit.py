@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import sys
 import warnings
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from tendonfmu.arrays import Numbers
-    from tendonfmu.estimate import FrictionFit
+    from tendonfmu.estimate import FitReport, FrictionFit
     from tendonfmu.fmu import SetParameter
     from tendonfmu.model import Finger, FingerSource
 
@@ -69,7 +68,7 @@ class FitResult(Result):
 
         types: dict[str, Any] = {"start": float, "value": float, "standard_error": float, "identified": bool}
         names = ("unit", "start", "value", "standard_error", "identified", "at_bound", "reason", "advice")
-        rows = self.report["parameters"]
+        rows = [dict(row) for row in self.report["parameters"]]
         index = pd.Index([row["path"] for row in rows], name="path", dtype=object)
         columns = {name: numpy.array([row[name] for row in rows], dtype=types.get(name, object)) for name in names}
         table: pd.DataFrame = pd.DataFrame(columns, index=index)
@@ -87,7 +86,7 @@ class FitResult(Result):
         return None if residual is None else _numbers(residual["rms"])
 
     @property
-    def report(self) -> Mapping[str, Any]:
+    def report(self) -> FitReport:
         """All results, as `tendonfmu fit --report` writes them."""
         return self.estimator.report_
 

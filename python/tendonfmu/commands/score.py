@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -19,7 +18,7 @@ from tendonfmu.commands.result import Result
 from tendonfmu.options import RecordingSources, ScoreOptions, keywords
 
 if TYPE_CHECKING:
-    from tendonfmu.detect import Scored
+    from tendonfmu.detect import Scored, ScoreReport
     from tendonfmu.model import FingerSource
 
 
@@ -64,7 +63,7 @@ class ScoreResult(Result):
         return self.scored.summary.delay["median"].value
 
     @property
-    def report(self) -> Mapping[str, Any]:
+    def report(self) -> ScoreReport:
         """All results, as `tendonfmu score -o` writes them."""
         return detect.score_report.build_report(self.scored)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -19,7 +18,7 @@ from tendonfmu.commands.result import Result
 from tendonfmu.options import RecordingSources, TuneOptions, keywords
 
 if TYPE_CHECKING:
-    from tendonfmu.detect import ContactTuning
+    from tendonfmu.detect import ContactTuning, TuneReport
     from tendonfmu.model import Finger, FingerSource
 
 
@@ -49,7 +48,7 @@ class TuneResult(Result):
         return self.tuning.kept_out_.alarms / self.tuning.kept_out_.hours
 
     @property
-    def report(self) -> Mapping[str, Any]:
+    def report(self) -> TuneReport:
         """All results, as `tendonfmu tune --report` writes them."""
         return detect.tune_report.build_report(self.tuning)
 

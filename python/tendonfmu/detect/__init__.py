@@ -14,8 +14,10 @@ if TYPE_CHECKING:
     from .counting import GRACE, DetectionScore, Event, pooled, sample_seconds, score_detection, stretches
     from .free_motion import SETTLING, free_parts, require_no_contact
     from .noise import pretension_of
+    from .score_types import ScoreReport
     from .scoring import Scored, Subject, Track, run_track, score_recordings
     from .summary import RocPoint, Summary
+    from .tune_types import TuneReport
     from .tuning import ContactTuning, NotEnough, TuneWarning
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -4,26 +4,37 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.detect.counting import GRACE, MERGED, SILENT, DetectionScore, Event
+from tendonfmu.detect.score_types import (
+    Estimate,
+    Estimates,
+    Figures,
+    Pair,
+    Point,
+    ScoredEvent,
+    ScoredRecording,
+    ScoreReport,
+)
 from tendonfmu.detect.scoring import Scored, Track
 from tendonfmu.detect.summary import RocPoint, Summary
 from tendonfmu.files import finite
+from tendonfmu.json_types import Values
 from tendonfmu.recordings import LABEL
 from tendonfmu.statistics import Interval, intervals
 
-FORMAT = "tendonfmu-score-1"
+FORMAT: Final = "tendonfmu-score-1"
 # of pushes: times the rms of the joint's residual, at the joint with the largest ratio
 SIZES = (1.5, 3.0, 6.0, math.inf)
 
 
-def build_report(scored: Scored) -> dict[str, Any]:
+def build_report(scored: Scored) -> ScoreReport:
     """Build the report of a finished score; numbers that are not finite become None."""
-    report = {
+    report: ScoreReport = {
         "format": FORMAT,
         "finger": scored.subject.finger.name,
         "model": str(scored.subject.path),
@@ -41,13 +52,13 @@ def build_report(scored: Scored) -> dict[str, Any]:
         },
         "recordings": [_recording(*each) for each in zip(scored.tracks, scored.scores, scored.summaries, strict=True)],
     }
-    return {key: finite(value) for key, value in report.items()}
+    return finite(report)
 
 
 # --- parts ------------------------------------------------------------------------------------------------------------
 
 
-def _summary(summary: Summary) -> dict[str, Any]:
+def _summary(summary: Summary) -> Figures:
     contact = summary.contact
     return {
         "events": summary.events,
@@ -63,7 +74,12 @@ def _summary(summary: Summary) -> dict[str, Any]:
         "free_minutes": summary.free_minutes,
         "free_alarm_share": _estimate(summary.free_alarm_share),
         "median_delay_s": summary.delay["median"].value,
-        "delay_s": {name: _estimate(each) for name, each in summary.delay.items()},
+        "delay_s": {
+            "lower_quartile": _estimate(summary.delay["lower_quartile"]),
+            "median": _estimate(summary.delay["median"]),
+            "upper_quartile": _estimate(summary.delay["upper_quartile"]),
+            "ninety_percent": _estimate(summary.delay["ninety_percent"]),
+        },
         "held": summary.held,
         "held_share": _estimate(summary.held_share),
         "overhang": {
@@ -87,7 +103,7 @@ def _summary(summary: Summary) -> dict[str, Any]:
     }
 
 
-def _recording(track: Track, score: DetectionScore, summary: Summary) -> dict[str, Any]:
+def _recording(track: Track, score: DetectionScore, summary: Summary) -> ScoredRecording:
     time = track.recording.time
     return {
         "path": str(track.recording.path),
@@ -103,7 +119,7 @@ def _recording(track: Track, score: DetectionScore, summary: Summary) -> dict[st
     }
 
 
-def _event(event: Event) -> dict[str, Any]:
+def _event(event: Event) -> ScoredEvent:
     return {
         "onset_s": event.onset,
         "end_s": event.end,
@@ -123,7 +139,7 @@ def _event(event: Event) -> dict[str, Any]:
     }
 
 
-def _point(point: RocPoint) -> dict[str, Any]:
+def _point(point: RocPoint) -> Point:
     return {
         "factor": point.factor,
         "found": point.found,
@@ -136,20 +152,20 @@ def _point(point: RocPoint) -> dict[str, Any]:
     }
 
 
-def _estimate(estimate: Interval) -> dict[str, Any]:
+def _estimate(estimate: Interval) -> Estimate:
     return {"value": estimate.value, "interval": _interval(estimate)}
 
 
-def _estimates(estimates: Sequence[Interval] | None) -> list[dict[str, Any]] | None:
+def _estimates(estimates: Sequence[Interval] | None) -> Estimates:
     return None if estimates is None else [_estimate(each) for each in estimates]
 
 
-def _interval(estimate: Interval) -> list[float] | None:
+def _interval(estimate: Interval) -> Pair:
     return None if math.isnan(estimate.low) or math.isnan(estimate.high) else [estimate.low, estimate.high]
 
 
-def _numbers(values: NDArray[np.float64] | None) -> list[float] | None:
-    return None if values is None else [float(value) for value in values]
+def _numbers(values: NDArray[np.float64] | None) -> Values | None:
+    return None if values is None else [*values.tolist()]
 
 
 def by_size(scored: Scored, left: Sequence[float]) -> list[dict[str, Any]] | None:

@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 
+from tendonfmu.detect.tune_types import AtFactor, AtPretension, KeptOut, Rates, TunedSensors, TuneReport
 from tendonfmu.detect.tuning import SURE, WITHIN, ContactTuning
 from tendonfmu.files import finite
+from tendonfmu.json_types import Sizes
 from tendonfmu.statistics import intervals
 
-FORMAT = "tendonfmu-tune-2"
+FORMAT: Final = "tendonfmu-tune-2"
 
 
-def build_report(tuning: ContactTuning) -> dict[str, Any]:
+def build_report(tuning: ContactTuning) -> TuneReport:
     """Build the report of a tuning, in SI units with None for what is not known."""
-    names = tuning.description_.joint_names
-    force = tuning.residuals_.force
-    report = {
+    force, bias = tuning.residuals_.force, tuning.bias_.keys()
+    report: TuneReport = {
         "format": FORMAT,
         "finger": tuning.description_.name,
-        "joints": names,
+        "joints": tuning.description_.joint_names,
         "kinematics": tuning.options.kinematics,
         "method": tuning.options.method,
         "false_alarms_per_hour": tuning.options.false_alarms_per_hour,
@@ -31,25 +32,33 @@ def build_report(tuning: ContactTuning) -> dict[str, Any]:
         "pushes": {"within_s": WITHIN, "share": SURE, "torque": tuning.push_.tolist()},
         "holds_for": {"lowest_force": float(force.min()), "highest_force": float(force.max())},
         "warnings": list(tuning.warnings_),
-        "bias": {**tuning.bias_.keys(), "time_constant": tuning.bias_.time_constant, "mean_force": tuning.bias_.force},
+        "bias": {
+            "drift_variance": bias["drift_variance"],
+            "noise_std": bias["noise_std"],
+            "noise_std_per_force": bias["noise_std_per_force"],
+            "time_constant": tuning.bias_.time_constant,
+            "mean_force": tuning.bias_.force,
+        },
         "contact": tuning.description_.data["contact"],
         "factor": tuning.loop_.factor,
         "tail": _tail(tuning),
         "pretensions": _pretensions(tuning),
         "sensor_fault": _sensors(tuning),
         "seconds": tuning.seconds_,
+        "sentence": "",
     }
-    report = {key: finite(value) for key, value in report.items()}
-    return {**report, "sentence": sentence(report)}
+    report = finite(report)
+    report["sentence"] = sentence(report)
+    return report
 
 
-def sentence(report: Mapping[str, Any]) -> str:
+def sentence(report: TuneReport) -> str:
     """Say how many false alarms were asked for and found, and which pushes are found at the least sensitive joint."""
     found, pushes = report["kept_out"], report["pushes"]
     minutes = found["minutes"]
     long = f"{minutes / 60.0:.1f} h" if minutes >= 60.0 else f"{minutes:.2g} min"
     alarms = "none" if found["alarms"] == 0 else f"{found['alarms']}"
-    pushed, joint = least_sensitive(report)
+    pushed, joint = least_sensitive(report["joints"], pushes["torque"])
     ending = f"{joint} are found within {1e3 * pushes['within_s']:.0f} ms, nine of ten."
     sized = "No pushes at" if pushed is None else f"Pushes of more than {1e3 * pushed:.2g} mN·m at"
     return (
@@ -58,20 +67,20 @@ def sentence(report: Mapping[str, Any]) -> str:
     )
 
 
-def least_sensitive(report: Mapping[str, Any]) -> tuple[float | None, str]:
+def least_sensitive(joints: Sequence[str], torques: Sizes) -> tuple[float | None, str]:
     """Return the largest of the torques that are found, None if at a joint none is, and its joint."""
-    torques = report["pushes"]["torque"]
-    worst = torques.index(None) if None in torques else int(np.argmax(torques))
-    return torques[worst], report["joints"][worst]
+    known = [torque for torque in torques if torque is not None]
+    worst = torques.index(max(known) if len(known) == len(torques) else None)
+    return torques[worst], joints[worst]
 
 
-def _rate(alarms: int, hours: float) -> dict[str, Any]:
+def _rate(alarms: int, hours: float) -> Rates:
     """Return alarms and their rate (1/h) with its 95 % interval."""
     rate = intervals.rate(alarms, hours)
     return {"alarms": alarms, "minutes": 60.0 * hours, "per_hour": rate.value, "interval": [rate.low, rate.high]}
 
 
-def _kept_out(tuning: ContactTuning) -> dict[str, Any]:
+def _kept_out(tuning: ContactTuning) -> KeptOut:
     found = tuning.kept_out_
     return {
         **_rate(found.alarms, found.hours),
@@ -89,7 +98,7 @@ def _kept_out(tuning: ContactTuning) -> dict[str, Any]:
     }
 
 
-def _tail(tuning: ContactTuning) -> list[dict[str, Any]]:
+def _tail(tuning: ContactTuning) -> list[AtFactor]:
     """Return the alarms in motion that was kept out, over factors on the bounds; that of the finger is 1."""
     loop = tuning.loop_
     return [
@@ -98,7 +107,7 @@ def _tail(tuning: ContactTuning) -> list[dict[str, Any]]:
     ]
 
 
-def _pretensions(tuning: ContactTuning) -> list[dict[str, Any]]:
+def _pretensions(tuning: ContactTuning) -> list[AtPretension]:
     residuals = tuning.residuals_
     force, rms = residuals.of_pretensions(residuals.force), residuals.rms()
     minutes = 60.0 * np.bincount(residuals.group, residuals.hours)
@@ -106,7 +115,7 @@ def _pretensions(tuning: ContactTuning) -> list[dict[str, Any]]:
     return [{"mean_force": mean, "minutes": long, "free_rms": spread} for mean, long, spread in columns]
 
 
-def _sensors(tuning: ContactTuning) -> dict[str, Any]:
+def _sensors(tuning: ContactTuning) -> TunedSensors:
     """Return the keys of sensor_fault, or why there are none, and the largest difference of force and spring (N)."""
     rule = tuning.sensors_
     keys = None if rule.keys is None else dict(rule.keys)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     )
     from .fisher_information import Noise, Progress, information, noise_of, sensitivities, unknowns
     from .fit_report import FitPicture, FitSeries, LawBands, LawCurve, asymmetric, evaluate, numbers_of, unseen_square
+    from .fit_types import Comparison, FitReport, FittedNumber, ResidualRms
     from .fitting import FitWarning, FrictionFit
     from .identifiability import EffectCoverage, Judgement, Verdict, counts_by_kind, coverage_of, durations, judge
     from .learning import (

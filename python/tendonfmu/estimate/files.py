@@ -8,7 +8,7 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from tendonfmu.files import check_output, check_output_folder, read_json, write_
 from tendonfmu.model import Finger, finger_from_data, read_finger
 from tendonfmu.recordings import Recording
 
-FIT_REPORT = "tendonfmu-fit-1"
+FIT_REPORT: Final = "tendonfmu-fit-1"
 UNFINISHED = "tendonfmu-fit-unfinished-1"
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +14,21 @@ from tendonfmu.arrays import Data, Numbers
 from tendonfmu.estimate.core_runs import CoreRuns, SlowDrift
 from tendonfmu.estimate.estimation import Unknown
 from tendonfmu.estimate.files import FIT_REPORT
+from tendonfmu.estimate.fit_types import (
+    Comparison,
+    FitReport,
+    FittedNumber,
+    GivenNumbers,
+    Innovations,
+    MemoryEntry,
+    ResidualRms,
+)
 from tendonfmu.estimate.learning import Learned, unknown_names
 from tendonfmu.estimate.verdicts import CAUSES, Fitted
 from tendonfmu.files import counted, finite
+from tendonfmu.json_types import Values
 from tendonfmu.model import Effect, Finger, Instance, Law, native, without_friction
-from tendonfmu.recordings import FitRecording, Model, consistency, rms, whiteness
+from tendonfmu.recordings import FitRecording, Model, RoutingEntry, consistency, rms, whiteness
 from tendonfmu.statistics import effective_samples
 
 # --- one recording under a finger -------------------------------------------------------------------------------------
@@ -46,21 +56,25 @@ def evaluate(start: Data, fitted: Data, recording: FitRecording) -> Evaluation:
     return Evaluation(recording, model, recording.run(start), recording.run(without_friction(fitted)), rest)
 
 
-def residual_entry(evaluations: Sequence[Evaluation], which: str) -> dict[str, list[float]] | None:
+def residual_entry(evaluations: Sequence[Evaluation], which: str) -> ResidualRms | None:
     """Compute the rms [n] by joint over the samples of a flag ("train" or "held_out"); None without any."""
     chosen = [np.asarray(getattr(evaluation.recording, which)) for evaluation in evaluations]
     if not any(flags.any() for flags in chosen):
         return None
     flags = np.concatenate(chosen)
     unknown = np.isnan(np.concatenate([evaluation.model.residual for evaluation in evaluations]))
-    series = {
-        "rms": [evaluation.model.residual for evaluation in evaluations],
-        "start_rms": [evaluation.start.residual for evaluation in evaluations],
-        "bias_only_rms": [evaluation.bias_only.residual for evaluation in evaluations],
-        "model_only_rms": [evaluation.model_only for evaluation in evaluations],
-        "torque_rms": [evaluation.recording.target for evaluation in evaluations],
+
+    def of(series: Callable[[Evaluation], Numbers]) -> Values:
+        values = np.concatenate([series(evaluation) for evaluation in evaluations])
+        return [*rms(np.where(unknown, np.nan, values), flags)]
+
+    return {
+        "rms": of(lambda evaluation: evaluation.model.residual),
+        "start_rms": of(lambda evaluation: evaluation.start.residual),
+        "bias_only_rms": of(lambda evaluation: evaluation.bias_only.residual),
+        "model_only_rms": of(lambda evaluation: evaluation.model_only),
+        "torque_rms": of(lambda evaluation: evaluation.recording.target),
     }
-    return {name: rms(np.where(unknown, np.nan, np.concatenate(values)), flags) for name, values in series.items()}
 
 
 LEAST_NIS, MOST_NIS, MOST_LAG_ONE = 0.5, 2.0, 0.3  # values outside give a warning
@@ -75,16 +89,18 @@ def build_report(
     options: Mapping[str, Any],  # options that shape the result, and `method`
     warnings: Sequence[str],
     numbers: Sequence[Fitted],
-    routing: Mapping[str, Any] | None,  # what was learned of it; None if not asked for
-    movement: Mapping[str, Any],  # what became of the given numbers
+    routing: RoutingEntry | None,  # what was learned of it; None if not asked for
+    movement: GivenNumbers,  # what became of the given numbers
     innovations: Sequence[Numbers],  # by recording, [N, n] standardised; NaN where not trained on
     training: Sequence[Evaluation],
     comparisons: Sequence[Evaluation],
-    memory: Mapping[str, Any] | None,  # how friction that remembers was fitted; None if there is none
-) -> dict[str, Any]:
+    memory: MemoryEntry | None,  # how friction that remembers was fitted; None if there is none
+) -> FitReport:
     """Build the report of a finished fit; numbers that are not finite become None."""
     units = {parameter.path: parameter.unit for parameter in native.Instance(fitted.image).parameters()}
-    report = {
+    trained = residual_entry(training, "train")
+    assert trained is not None, "a fit is trained on something"
+    report: FitReport = {
         "format": FIT_REPORT,
         "finger": fitted.name,
         "method": options["method"],
@@ -104,20 +120,20 @@ def build_report(
             "matrix": _correlation(learned.covariance),
         },
         "routing": routing,
-        "given_numbers": dict(movement),
+        "given_numbers": movement,
         "identified": {"count": sum(number.identified for number in numbers), "of": len(numbers)},
         "residual": {
-            "train": residual_entry(training, "train"),
+            "train": trained,
             "held_out": residual_entry(training, "held_out"),
             "comparisons": [_comparison(evaluation) for evaluation in comparisons],
         },
         "innovations": _innovations(innovations, learned.weights),
         "memory": memory,
     }
-    return {key: finite(value) for key, value in report.items()}
+    return finite(report)
 
 
-def _parameter(number: Fitted, units: Mapping[str, str]) -> dict[str, Any]:
+def _parameter(number: Fitted, units: Mapping[str, str]) -> FittedNumber:
     return {
         "path": number.number.path,
         "unit": units[number.number.path],
@@ -132,7 +148,7 @@ def _parameter(number: Fitted, units: Mapping[str, str]) -> dict[str, Any]:
     }
 
 
-def _innovations(innovations: Sequence[Numbers], weights: Sequence[Numbers]) -> dict[str, Any]:
+def _innovations(innovations: Sequence[Numbers], weights: Sequence[Numbers]) -> Innovations:
     """Describe the residuals of the samples trained on, and how many independent samples they are worth."""
     samples, worth = effective_samples(innovations, weights)
     share = float(worth.sum() / samples.sum()) if samples.sum() else 1.0
@@ -143,9 +159,9 @@ def _innovations(innovations: Sequence[Numbers], weights: Sequence[Numbers]) -> 
     }
 
 
-def _comparison(evaluation: Evaluation) -> dict[str, Any]:
-    recording = evaluation.recording
-    return {"label": recording.path.stem, **recording.entry(), **(residual_entry([evaluation], "train") or {})}
+def _comparison(evaluation: Evaluation) -> Comparison:
+    recording, left = evaluation.recording, residual_entry([evaluation], "train")
+    return cast("Comparison", {"label": recording.path.stem, **recording.entry(), **(left or {})})
 
 
 def _correlation(covariance: Numbers) -> list[list[float]]:
@@ -169,7 +185,7 @@ def fit_sentences(learned: Learned, numbers: Sequence[Fitted]) -> list[str]:
     return sentences
 
 
-def noise_sentences(innovations: Mapping[str, Any]) -> list[str]:
+def noise_sentences(innovations: Innovations) -> list[str]:
     """Warn if the residuals contradict the noise settings, since the standard errors depend on these."""
     nis, lag_one = innovations["nis"]["mean"], innovations["whiteness"]["lag_one"]
     sentences = []
@@ -181,7 +197,7 @@ def noise_sentences(innovations: Mapping[str, Any]) -> list[str]:
         )
     far = max((abs(value) for value in lag_one if value is not None), default=0.0)
     if far > MOST_LAG_ONE:
-        samples, worth = (sum(innovations["effective"][key]) for key in ("samples", "worth"))
+        samples, worth = sum(innovations["effective"]["samples"]), sum(innovations["effective"]["worth"])
         count = f"{samples:.0f} samples count as {worth:.0f}" if worth < samples else "each sample counts as new"
         sentences.append(
             f"residuals are not white (autocorrelation {far:.2f} from one sample to the next): the model lacks an "
@@ -208,10 +224,13 @@ def unseen_square(data: Data, recordings: Sequence[FitRecording]) -> float:
 def is_worse(training: Sequence[Evaluation]) -> bool:
     """Return whether fitted numbers leave more of the samples held out than the given ones."""
     held = residual_entry(training, "held_out")
-    return held is not None and float(np.sum(np.square(held["rms"]))) > float(np.sum(np.square(held["start_rms"])))
+    if held is None:
+        return False
+    fitted, given = (np.array(each, dtype=np.float64) for each in (held["rms"], held["start_rms"]))
+    return float(np.sum(fitted**2)) > float(np.sum(given**2))
 
 
-def movement(numbers: Sequence[Fitted], estimated: bool, kept: bool) -> dict[str, Any]:
+def movement(numbers: Sequence[Fitted], estimated: bool, kept: bool) -> GivenNumbers:
     """Return how many numbers moved, which stayed, and why, for the report."""
     moved = [number for number in numbers if abs(number.value - number.start) > number.standard_error]
     stayed = [number for number in numbers if abs(number.value - number.start) <= number.standard_error]
@@ -287,7 +306,7 @@ class FitPicture:
 
     # "tendonfmu-fit-1" as written by `--report`. If residual.train and residual.held_out have "start_rms" [n] beside
     # "rms" (the residual with the parameters of the start), it is shown
-    report: Mapping[str, Any]
+    report: FitReport
     start: Finger
     fitted: Finger
     unknowns: Sequence[Unknown]  # [p] unknowns of the estimation
@@ -399,6 +418,6 @@ def asymmetric(effect: Effect) -> bool:
     return any(law.get("positive") is not None for law in effect.laws)
 
 
-def numbers_of(effect: Effect, report: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+def numbers_of(effect: Effect, report: FitReport) -> list[FittedNumber]:
     """Return the entries of the report for the estimated numbers of an effect."""
     return [entry for entry in report["parameters"] if entry["path"].startswith(f"{effect.path}.")]

@@ -49,6 +49,7 @@ from tendonfmu.recordings import (
     FitRecording,
     Held,
     RecordingSource,
+    RoutingEntry,
     admit,
     listed_sources,
     motion_of,
@@ -159,7 +160,7 @@ class FrictionFit(Configured):
         finger = read_finger(self.finger)
         given, compared_with = listed_sources(recordings), listed_sources(compare)
         check_given_once(given, compared_with)
-        self.routing_: dict[str, Any] | None = None
+        self.routing_: RoutingEntry | None = None
         if options.routing:
             finger, self.routing_ = _with_routing(finger, given)
         previous = None if options.previous is None else read_previous_fit(Path(options.previous))
@@ -349,7 +350,7 @@ class FrictionFit(Configured):
         return description_text(self.description_.data)
 
 
-def _with_routing(given: Finger, sources: Sequence[RecordingSource]) -> tuple[Finger, dict[str, Any]]:
+def _with_routing(given: Finger, sources: Sequence[RecordingSource]) -> tuple[Finger, RoutingEntry]:
     """Return the finger with the routing that the recordings show, and what the report says of it."""
     learned = require_routing(given, read_recordings(sources))
     return routed(given, learned)[0], routing_entry(given, learned)

@@ -18,6 +18,7 @@ import numpy as np
 from tendonfmu.arrays import Data, Numbers
 from tendonfmu.estimate.core_runs import CoreRuns, SlowDrift
 from tendonfmu.estimate.estimation import Estimator
+from tendonfmu.estimate.fit_types import MemoryEntry
 from tendonfmu.estimate.learning import Learned, Settings, Watch, unknown_names
 from tendonfmu.estimate.memory import (
     CORDS,
@@ -278,7 +279,7 @@ class Remembered:
     left_delivered: Numbers
     left_out: list[str]  # paths of the numbers that the motion does not show
 
-    def entry(self) -> dict[str, object]:
+    def entry(self) -> MemoryEntry:
         """Return what a report says."""
         return {
             "angles": self.angles,

@@ -9,9 +9,11 @@ import json
 import math
 from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TypeVar, cast
 
 from tendonfmu.errors import InputError
+
+T = TypeVar("T")
 
 LARGEST_FILE = 64 << 20  # bytes, as the native reader's
 
@@ -79,15 +81,16 @@ def shown(value: Any) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def finite(value: Any) -> Any:
+def finite(value: T) -> T:
     """Replace every number that is not finite by None."""
+    made: Any = value
     if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {key: finite(inner) for key, inner in value.items()}
-    if isinstance(value, list | tuple):
-        return [finite(inner) for inner in value]
-    return value
+        made = value if math.isfinite(value) else None
+    elif isinstance(value, Mapping):
+        made = {key: finite(inner) for key, inner in value.items()}
+    elif isinstance(value, list | tuple):
+        made = [finite(inner) for inner in value]
+    return cast("T", made)
 
 
 def report_text(report: Mapping[str, Any]) -> str:

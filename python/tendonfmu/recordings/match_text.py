@@ -14,6 +14,7 @@ from tendonfmu.arrays import Numbers
 from tendonfmu.files import are, counted, percent
 from tendonfmu.model import Finding, Finger
 from tendonfmu.recordings.converters import units
+from tendonfmu.recordings.entry_types import LearnedNumber, RoutingEntry
 from tendonfmu.recordings.faults import JITTER, LOST_SHARE, Clipped, Clock, Coarse, Held
 from tendonfmu.recordings.kinematics import Balance, Correction, Repair
 from tendonfmu.recordings.recording import GROUP_PER, GROUPS, Recording
@@ -211,7 +212,7 @@ def varying_sentences(finger: Finger, learned: Sequence[TendonRouting]) -> Itera
             yield f"routing: {_of_tendon(finger, each.as_described)}"
 
 
-def routing_entry(finger: Finger, learned: Sequence[TendonRouting]) -> dict[str, Any]:
+def routing_entry(finger: Finger, learned: Sequence[TendonRouting]) -> RoutingEntry:
     """Report what was learned of the routing: every number, and sentences on what is off and what is not known."""
     changed = {number.path for number in routed(finger, learned)[1]}
     sentences = [f"routing: {_of_tendon(finger, each)}" for each in learned if each.differs or each.varying]
@@ -220,7 +221,7 @@ def routing_entry(finger: Finger, learned: Sequence[TendonRouting]) -> dict[str,
         sentences.append(f"routing: without joint positions, redundant tendons show {shown}; the others stay")
     elif unknown := [path for each in learned for path in each.unknown]:
         sentences.append(f"routing: this motion does not determine {', '.join(unknown)}; the described values stay")
-    numbers = [
+    numbers: list[LearnedNumber] = [
         {
             "path": number.path,
             "described": number.described,

@@ -25,6 +25,7 @@ from tendonfmu.model import (
     velocity_threshold,
     watches_motors,
 )
+from tendonfmu.recordings.entry_types import RecordingEntry
 from tendonfmu.recordings.faults import SETTLING, gap_sentences, gaps, rate_sentences, silent_tendons, stuck_sensors
 from tendonfmu.recordings.recording import Recording, check_numbers
 from tendonfmu.recordings.residuals import Model, run_parts
@@ -110,7 +111,7 @@ class FitRecording:
         residual, variance = (np.where(self.silent, np.nan, each) for each in (model.residual, model.variance))
         return replace(model, residual=residual, variance=variance)
 
-    def entry(self) -> dict[str, Any]:
+    def entry(self) -> RecordingEntry:
         """Return what a report says about the recording."""
         return {
             "path": str(self.path),

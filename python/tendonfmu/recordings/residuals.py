@@ -15,6 +15,7 @@ from scipy.special import chdtrc, gammaincinv
 
 from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.model import native, without_detection
+from tendonfmu.recordings.entry_types import Nis, Whiteness
 
 LAGS = 20  # of the Ljung-Box test
 CONFIDENCE = 0.95
@@ -78,7 +79,7 @@ def rms(values: Numbers, chosen: Flags) -> list[float]:
     return [float(np.sqrt(np.mean(column**2))) if len(column) else math.nan for column in columns]
 
 
-def consistency(standardised: Sequence[Numbers], share: float = 1.0) -> dict[str, Any]:
+def consistency(standardised: Sequence[Numbers], share: float = 1.0) -> Nis:
     """Return the NIS, the mean of the squared standardised innovations, and its chi-square interval."""
     # standardised: [N, n]; returns [low, high]
     values = np.concatenate([part[~np.isnan(part)] for part in standardised])
@@ -90,24 +91,24 @@ def consistency(standardised: Sequence[Numbers], share: float = 1.0) -> dict[str
     return {"mean": mean, "interval": [low, high], "consistent": bool(low <= mean <= high)}
 
 
-def whiteness(standardised: Sequence[Numbers]) -> dict[str, list[float]]:
+def whiteness(standardised: Sequence[Numbers]) -> Whiteness:
     """Return how far the standardised residuals of each joint are from white noise."""
     # standardised: [N, n]; returns [n] [n]
     joints = standardised[0].shape[1]
-    lag_one, p_value = [], []
+    found: Whiteness = {"lag_one": [], "ljung_box_p": []}
     for j in range(joints):
         series = [part[:, j] for part in standardised]
         power = sum(float(np.nansum(part**2)) for part in series)
         count = sum(int(np.sum(~np.isnan(part))) for part in series)
         if count <= LAGS + 1 or not power:
-            lag_one.append(math.nan)
-            p_value.append(math.nan)
+            found["lag_one"].append(math.nan)
+            found["ljung_box_p"].append(math.nan)
             continue
         correlations = [_lagged(series, lag) / power for lag in range(1, LAGS + 1)]
         statistic = count * (count + 2) * sum(r * r / (count - lag) for lag, r in enumerate(correlations, start=1))
-        lag_one.append(correlations[0])
-        p_value.append(float(chdtrc(LAGS, statistic)))
-    return {"lag_one": lag_one, "ljung_box_p": p_value}
+        found["lag_one"].append(correlations[0])
+        found["ljung_box_p"].append(float(chdtrc(LAGS, statistic)))
+    return found
 
 
 def _lagged(series: Sequence[Numbers], lag: int) -> float:

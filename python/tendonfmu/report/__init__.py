@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from .diagnosis_figures import diagnosis_sheets
     from .diagnosis_files import REPORT, build_report, check_folder, write_diagnosis
     from .diagnosis_text import confusion_sentence, error_sentence, gain_text, left_sentence, names_of, unit_of
+    from .diagnosis_types import CauseEntry, DiagnosisReport
     from .fit_figures import torque_sheets
     from .fit_laws import law_sheets
     from .fit_page import write_fit_page

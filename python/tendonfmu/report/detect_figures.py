@@ -339,12 +339,9 @@ def write_tune_figures(tuning: ContactTuning, folder: Path) -> dict[Path, str]:
 def tail_sheet(tuning: ContactTuning) -> draw.Sheet:
     """Show false alarms per hour over the factor on the bounds, in motion that was kept out."""
     report = tune_report.build_report(tuning)
-    tail = sorted(report["tail"], key=lambda point: float(point["factor"]))
-
-    def column(name: str) -> Numbers:
-        return np.array([point[name] for point in tail], dtype=float)
-
-    factors, intervals = column("factor"), column("interval")
+    tail = sorted(report["tail"], key=lambda point: point["factor"])
+    factors = np.array([point["factor"] for point in tail])
+    rates, intervals = np.array([point["per_hour"] for point in tail]), np.array([point["interval"] for point in tail])
     found, asked = report["kept_out"]["per_hour"], report["false_alarms_per_hour"]
     limits = float(min(factors[0], 0.9)), float(max(factors[-1], 1.1))
     shown = draw.panel(
@@ -353,7 +350,7 @@ def tail_sheet(tuning: ContactTuning) -> draw.Sheet:
         "factor on the chosen bounds",
         "false alarms per hour",
         draw.band(factors, intervals[:, 0], intervals[:, 1], "95 % interval"),
-        draw.curve(factors, column("per_hour"), "kept out", draw.BLUE, 1.8),
+        draw.curve(factors, rates, "kept out", draw.BLUE, 1.8),
         draw.curve(
             np.array(limits), np.full(2, asked), f"asked for: {asked:.3g} per hour", draw.VERMILION, 1.3, "dash"
         ),

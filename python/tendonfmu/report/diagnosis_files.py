@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -31,6 +31,7 @@ from tendonfmu.fmu import build_fmu
 from tendonfmu.model import description_text
 from tendonfmu.report.diagnosis_page import PAGE, diagnosis_page
 from tendonfmu.report.diagnosis_text import names_of
+from tendonfmu.report.diagnosis_types import DiagnosisReport
 from tendonfmu.report.diagnosis_words import words_of
 from tendonfmu.statistics import Interval
 from tendonfmu.tasks import uninterrupted
@@ -126,7 +127,7 @@ def _make(diagnosis: found.Diagnosis, folder: Path) -> dict[Path, str]:
 # --- the report -------------------------------------------------------------------------------------------------------
 
 
-def build_report(diagnosis: found.Diagnosis, files: Sequence[str] = ()) -> dict[str, Any]:
+def build_report(diagnosis: found.Diagnosis, files: Sequence[str] = ()) -> DiagnosisReport:
     """Make the report of a diagnosis."""
     effect = ("title", "surviving_share", "ordinary_gain", "needed_gain", "experiment")
     report = {
@@ -158,7 +159,7 @@ def build_report(diagnosis: found.Diagnosis, files: Sequence[str] = ()) -> dict[
         "files": files,
         "views": [_view(view) for view in diagnosis.views],
     }
-    return {key: finite(value) for key, value in report.items()}
+    return cast("DiagnosisReport", finite(report))
 
 
 def _plain(value: Any, **renamed: str) -> Any:

@@ -7,7 +7,7 @@ well the numbers are known: standard error over value of each, and the correlati
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tendonfmu import drawing as draw
 from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.drawing import panel
-from tendonfmu.estimate import FitPicture, FitSeries, identifiability
+from tendonfmu.estimate import FitPicture, FitSeries, FittedNumber, identifiability
 from tendonfmu.recordings import flagged_stretches
 from tendonfmu.report.fit_laws import law_sheets
 from tendonfmu.report.numbers import rms, torque_unit
@@ -65,7 +65,7 @@ def torque_sheets(picture: FitPicture) -> Iterator[draw.Sheet]:
     explanation = (
         " The residual is taken before the bias learns from the sample. Its share is that of the rms in the time shown."
     )
-    if any(recording.get("external_torque") for recording in picture.report["recordings"]):
+    if any(recording["external_torque"] for recording in picture.report["recordings"]):
         explanation += " A measured external torque is subtracted from the torque shown."
     for number, (part, series, where) in enumerate(_parts(picture), start=1):
         shown = _window(series.time, where, first)
@@ -263,12 +263,12 @@ def kind_of(path: str) -> tuple[int, int, str]:
     return len(_KINDS) + 1, 0, name
 
 
-def relative_error(entry: Mapping[str, Any]) -> float:
+def relative_error(entry: FittedNumber) -> float:
     """Return standard error over value of a number of the report; infinite where there is none."""
-    error, value = entry.get("standard_error"), entry.get("value")
+    error, value = entry["standard_error"], entry["value"]
     if error is None or not value or not np.isfinite(error):
         return float("inf")
-    return abs(float(error) / float(value))
+    return abs(error / value)
 
 
 def error_sheet(picture: FitPicture) -> draw.Sheet:
@@ -276,7 +276,7 @@ def error_sheet(picture: FitPicture) -> draw.Sheet:
     entries = picture.report["parameters"]
     kinds = sorted({kind_of(entry["path"]) for entry in entries})
     row_of = {kind: row for row, kind in enumerate(kinds)}
-    members: list[list[Mapping[str, Any]]] = [[] for _ in kinds]
+    members: list[list[FittedNumber]] = [[] for _ in kinds]
     for entry in entries:
         members[row_of[kind_of(entry["path"])]].append(entry)
     names = tuple(
@@ -310,7 +310,7 @@ def error_sheet(picture: FitPicture) -> draw.Sheet:
     )
 
 
-def _dots(members: list[list[Mapping[str, Any]]]) -> Iterator[draw.Trace]:
+def _dots(members: list[list[FittedNumber]]) -> Iterator[draw.Trace]:
     """Place the dots of a row side by side in the order of the description, so that none hides another."""
     for name, wanted in (("identified", True), ("not identified", False)):
         x, y = list[float](), list[float]()

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from tendonfmu.estimate import FitPicture, verdicts
+from tendonfmu.estimate import FitPicture, FitReport, FittedNumber, verdicts
 from tendonfmu.files import write_text
 from tendonfmu.model import part_of
+from tendonfmu.recordings import RecordingEntry
 from tendonfmu.report import fit_text as text
 from tendonfmu.report.fit_figures import fit_sheets, strongest_pairs
 from tendonfmu.report.numbers import Row, percent, unit_text
@@ -16,8 +17,6 @@ from tendonfmu.report.page import Tile, make_folder, render
 
 PAGE = "report.html"
 PAIRS = 20  # most strongly correlated pairs in the table
-
-Entry = Mapping[str, Any]
 
 
 def write_fit_page(picture: FitPicture, folder: Path) -> dict[Path, str]:
@@ -51,12 +50,12 @@ def fit_page(picture: FitPicture) -> str:
             for pair in strongest_pairs(picture, PAIRS)
         ],
         recordings=[_recording(recording) for recording in report["recordings"]],
-        options={name: _option(value) for name, value in report.get("options", {}).items()},
+        options={name: _option(value) for name, value in report["options"].items()},
         groups=list(_groups(picture)),
     )
 
 
-def _tiles(report: Entry, tables: Sequence[text.ResidualTable]) -> list[Tile]:
+def _tiles(report: FitReport, tables: Sequence[text.ResidualTable]) -> list[Tile]:
     few, many = text.apart(tables)
     tiles = [
         Tile(percent(table.all.left), "", f"of the torque is left: {table.title[0].lower() + table.title[1:]}")
@@ -74,12 +73,12 @@ def _tiles(report: Entry, tables: Sequence[text.ResidualTable]) -> list[Tile]:
 # --- tables -----------------------------------------------------------------------------------------------------------
 
 
-def _doubts(report: Entry) -> Iterator[tuple[str, list[Row]]]:
+def _doubts(report: FitReport) -> Iterator[tuple[str, list[Row]]]:
     """List the numbers that are not identified by reason, most frequent first."""
-    by_reason: dict[str, list[Entry]] = {}
+    by_reason: dict[str, list[FittedNumber]] = {}
     for entry in report["parameters"]:
         if not entry["identified"]:
-            by_reason.setdefault(entry.get("reason") or "unknown", []).append(entry)
+            by_reason.setdefault(entry["reason"] or "unknown", []).append(entry)
     for reason, entries in sorted(by_reason.items(), key=lambda item: -len(item[1])):
         rows: list[Row] = [
             (entry["path"], *_value(entry), unit_text(entry["unit"]), entry["advice"] or "") for entry in entries
@@ -89,7 +88,7 @@ def _doubts(report: Entry) -> Iterator[tuple[str, list[Row]]]:
 
 def _groups(picture: FitPicture) -> Iterator[dict[str, Any]]:
     """List all numbers by joint and tendon: (number, start, fitted, standard error, unit, identified)."""
-    groups: dict[str, list[tuple[str, Entry]]] = {}
+    groups: dict[str, list[tuple[str, FittedNumber]]] = {}
     for entry in picture.report["parameters"]:
         name, path = "Others", entry["path"]
         if place := part_of(path):
@@ -109,19 +108,19 @@ def _groups(picture: FitPicture) -> Iterator[dict[str, Any]]:
         }
 
 
-def _value(entry: Entry) -> tuple[str, str]:
+def _value(entry: FittedNumber) -> tuple[str, str]:
     return _number(entry["value"], 4), _number(entry["standard_error"], 2)
 
 
-def _identified(entry: Entry) -> str:
+def _identified(entry: FittedNumber) -> str:
     bound = f", at its {entry['at_bound']} bound" if entry["at_bound"] else ""
     return ("yes" if entry["identified"] else "no") + bound
 
 
-def _recording(recording: Entry) -> Row:
-    counts = (str(recording[key]) for key in ("samples", "used", "held_out", "contact_left_out"))
+def _recording(recording: RecordingEntry) -> Row:
+    counts = recording["samples"], recording["used"], recording["held_out"], recording["contact_left_out"]
     length, force = _number(recording["duration"], 4), _number(recording["mean_force"])
-    return recording["path"], length, *counts, force, str(recording["kinematics"])
+    return recording["path"], length, *map(str, counts), force, str(recording["kinematics"])
 
 
 def _option(value: Any) -> str:

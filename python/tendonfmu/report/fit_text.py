@@ -4,16 +4,24 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
-from tendonfmu.estimate import FitPicture, Fitted, FrictionFit, identifiability, known_numbers, verdicts
+from tendonfmu.estimate import (
+    Comparison,
+    FitPicture,
+    FitReport,
+    Fitted,
+    FrictionFit,
+    ResidualRms,
+    identifiability,
+    known_numbers,
+    verdicts,
+)
 from tendonfmu.files import are, counted
 from tendonfmu.model import Finger, effects
 from tendonfmu.report.numbers import Row, Table, column, percent, rounded, together, torque_unit
 
-Report = Mapping[str, Any]
 EXAMPLES = 3  # paths listed for each reason
 _METHODS = {
     "batch": "Maximum likelihood over all samples at once (batch)",
@@ -66,17 +74,18 @@ class ResidualTable:
     all: ResidualRow  # all joints together
 
 
-def residual_tables(report: Report, joints: Sequence[str]) -> list[ResidualTable]:
+def residual_tables(report: FitReport, joints: Sequence[str]) -> list[ResidualTable]:
     """List the residuals of a fit by set of data, all in one unit."""
     residual = report["residual"]
-    sets = [("Training", residual["train"]), ("Held out of training", residual.get("held_out"))]
-    sets += [(f"{_COMPARED}{run['label']}", run) for run in residual.get("comparisons") or []]
-    known = [(title, data) for title, data in sets if data and data.get("rms")]
+    sets: list[tuple[str, ResidualRms | Comparison | None]]
+    sets = [("Training", residual["train"]), ("Held out of training", residual["held_out"])]
+    sets += [(f"{_COMPARED}{run['label']}", run) for run in residual["comparisons"]]
+    known = [(title, data) for title, data in sets if data and "rms" in data]
     factor, unit = torque_unit(max((max(column(data["torque_rms"])) for _, data in known), default=0.0))
-    keys = ("torque_rms", "rms", "start_rms", "bias_only_rms", "model_only_rms")
     listed = []
     for title, data in known:
-        columns = [column(data.get(key) or [None] * len(joints)) for key in keys]
+        figures = (data["torque_rms"], data["rms"], data["start_rms"], data["bias_only_rms"], data["model_only_rms"])
+        columns = [column(each) for each in figures]
         rows = [
             ResidualRow(name, *(factor * value if math.isfinite(value) else None for value in values))
             for name, *values in zip(
@@ -98,7 +107,7 @@ def page_tables(tables: list[ResidualTable], joints: Sequence[str]) -> list[Resi
 # --- sentences of the page --------------------------------------------------------------------------------------------
 
 
-def state_of(report: Report) -> str:
+def state_of(report: FitReport) -> str:
     """Say what is wrong with the fit; empty if nothing is."""
     if not report["finished"]:
         return "Unfinished: the fit was interrupted. These are the best values so far."
@@ -113,10 +122,9 @@ def summary_sentences(picture: FitPicture, tables: Sequence[ResidualTable]) -> I
     rounds = "" if report["method"] == "ekf" else f", {counted(report['passes'], 'pass', 'passes')} over the data"
     yield f"{method}{rounds}, {report['seconds']:.3g} s."
     yield from _how_well(tables)
-    yield from (report.get("routing") or {}).get("sentences", ())
+    yield from report["routing"]["sentences"] if report["routing"] else ()
     yield from memory_sentences(report)
-    if "given_numbers" in report:  # reports of earlier versions have none
-        yield report["given_numbers"]["paragraph"]
+    yield report["given_numbers"]["paragraph"]
     count, of = report["identified"]["count"], report["identified"]["of"]
     kept = sum(entry["reason"] == "kept" for entry in report["parameters"])
     yield (
@@ -130,12 +138,13 @@ def summary_sentences(picture: FitPicture, tables: Sequence[ResidualTable]) -> I
     yield from sums_known(picture.fitted)
 
 
-def memory_sentences(report: Mapping[str, Any]) -> Iterator[str]:
+def memory_sentences(report: FitReport) -> Iterator[str]:
     """Say which angles friction that remembers was fitted to, and what is left with them and as delivered."""
-    memory = report.get("memory")
+    memory = report["memory"]
     if memory:
         left, delivered = (
-            ", ".join(f"{1e3 * value:.3g}" for value in memory[key]) for key in ("left", "left_delivered")
+            ", ".join(f"{1e3 * value:.3g}" for value in column(values))
+            for values in (memory["left"], memory["left_delivered"])
         )
         beside = "" if left == delivered else f"; {delivered} mN·m with the kinematics asked for"
         yield f"Fitted to the angles of {memory['angles']}: {left} mN·m by joint left without a learning bias{beside}."
@@ -217,17 +226,18 @@ def consistency(picture: FitPicture) -> Iterator[str]:
     """Describe the size (NIS) and whiteness of the innovations in words."""
     innovations = picture.report["innovations"]
     nis, lag_one = innovations["nis"], innovations["whiteness"]["lag_one"]
-    if nis.get("mean") is not None:
+    mean = nis["mean"]
+    if mean is not None:
         low, high = nis["interval"]
         meaning = "as large as the noise that the description states"
         if not nis["consistent"]:
-            size, far = ("larger", "small") if nis["mean"] > 1 else ("smaller", "large")
+            size, far = ("larger", "small") if mean > 1 else ("smaller", "large")
             meaning = (
-                f"{size} than the noise that the description states, by a factor of {math.sqrt(nis['mean']):.2g}; this "
+                f"{size} than the noise that the description states, by a factor of {math.sqrt(mean):.2g}; this "
                 f"alone makes the standard errors too {far} by about the same factor"
             )
         yield (
-            f"Mean squared standardised innovation (NIS) {nis['mean']:.3g}; expected 1, in 95 % of cases between "
+            f"Mean squared standardised innovation (NIS) {mean:.3g}; expected 1, in 95 % of cases between "
             f"{low:.4g} and {high:.4g}. The innovations are {meaning}."
         )
     strong = [
@@ -236,8 +246,7 @@ def consistency(picture: FitPicture) -> Iterator[str]:
         if value is not None and abs(value) > 0.1
     ]
     if strong:
-        effective = innovations.get("effective") or {"samples": [0.0], "worth": [0.0]}
-        samples, worth = sum(effective["samples"]), sum(effective["worth"])
+        samples, worth = sum(innovations["effective"]["samples"]), sum(innovations["effective"]["worth"])
         count = "the standard errors count each sample as new"
         if worth < samples:
             count = f"estimates and standard errors count the {samples:.0f} samples as {worth:.0f}"
@@ -284,13 +293,15 @@ def _kinds(numbers: Sequence[Fitted]) -> Iterator[Row]:
 def lines(fit: FrictionFit) -> Iterator[str]:
     """List the lines to print: how the fit went, the residuals, and what would identify the remaining numbers."""
     report, numbers = fit.report_, fit.numbers_
-    keys = ("used", "held_out", "contact_left_out", "faulty_left_out", "at_rest")
-    used, held, contact, faulty, rests = (sum(recording[key] for recording in report["recordings"]) for key in keys)
+    recordings = report["recordings"]
+    used, held = sum(each["used"] for each in recordings), sum(each["held_out"] for each in recordings)
+    rests = sum(each["at_rest"] for each in recordings)
+    left_out = sum(each["contact_left_out"] + each["faulty_left_out"] for each in recordings)
     ended = "converged" if report["converged"] else "NOT converged"
     passes = f", {counted(report['passes'], 'pass', 'passes')}" if report["passes"] else ""
     yield (
         f"{report['method']}: {ended} in {report['seconds']:.1f} s{passes}; trained on {counted(used, 'sample')}, "
-        f"{held} held out, {contact + faulty} left out" + (f", {rests} at rest" if rests else "")
+        f"{held} held out, {left_out} left out" + (f", {rests} at rest" if rests else "")
     )
     innovations = report["innovations"]
     low, high = innovations["nis"]["interval"]
@@ -300,11 +311,11 @@ def lines(fit: FrictionFit) -> Iterator[str]:
             f"innovations: NIS {innovations['nis']['mean']:.3g} ({low:.3f} to {high:.3f} if the noise settings "
             f"hold), autocorrelation at lag one {lags}"
         )
-    samples, worth = (innovations["effective"][key] for key in ("samples", "worth"))
+    samples, worth = innovations["effective"]["samples"], innovations["effective"]["worth"]
     if sum(worth) < sum(samples):
         by_joint = ", ".join(f"{count:.0f}" for count in worth)
         yield f"effective number of samples by joint: {by_joint} of {samples[0]:.0f}"
-    yield from (report["routing"] or {}).get("sentences", ())
+    yield from report["routing"]["sentences"] if report["routing"] else ()
     yield from memory_sentences(report)
     yield report["given_numbers"]["paragraph"]
     for cause, count in Counter(number.cause for number in numbers if number.cause).most_common():

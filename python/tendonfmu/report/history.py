@@ -83,12 +83,15 @@ def headline(history: History) -> str:
 
 def trend_sentence(line: Line, history: History, names: Names) -> str:
     """Describe the trend of one cause."""
-    what = at_place(line.title, line.where, names)
+    return f"{at_place(line.title, line.where, names)}: {_trend(line, history)}"
+
+
+def _trend(line: Line, history: History) -> str:
     since = f", different from the reference since {Path(line.since).name}" if line.since else ""
     if line.trend is None:
-        return f"{what}: {quantity(line.sizes[-1].size.now.value, line.sizes[-1].size.unit)}{since}"
+        return f"{quantity(line.sizes[-1].size.now.value, line.sizes[-1].size.unit)}{since}"
     if line.trend.low <= 0.0 <= line.trend.high:
-        return f"{what}: no trend{since}"
+        return f"no trend{since}"
     grows = "grows" if line.trend.value * line.sizes[-1].size.now.value > 0 else "falls"
     share, unit = share_of(line), line.sizes[0].size.unit
     slope = line.trend if share is None else share
@@ -96,8 +99,7 @@ def trend_sentence(line: Line, history: History, names: Names) -> str:
     value, least, most = (
         quantity(size, unit) if share is None else percent(size) for size in (abs(slope.value), low, high)
     )
-    trend = f"{value} a {history.unit} ({least} to {most})"
-    return f"{what}: {grows} {trend}{since}"
+    return f"{grows} {value} a {history.unit} ({least} to {most}){since}"
 
 
 def rows_of_lines(history: History, names: Names) -> Iterator[Row]:
@@ -110,7 +112,7 @@ def rows_of_lines(history: History, names: Names) -> Iterator[Row]:
             quantity(last.reference.value, last.unit),
             quantity(last.now.value, last.unit),
             f"{sum(size.named for size in line.sizes)} of {len(line.sizes)}",
-            trend_sentence(line, history, names).partition(": ")[2],
+            _trend(line, history),
         )
 
 

@@ -1,6 +1,6 @@
 """What a hand is: its fingers, which columns of a recording are theirs, and the wrist that they share.
 
-docs/reference/hand.md describes the file; `schema/hand.schema.json` defines the same for editors.
+docs/reference/hand.md describes the file; `schema/hand.schema.json`, made from `hand_types`, is for editors.
 """
 
 from __future__ import annotations
@@ -11,19 +11,15 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
+from tendonfmu.commands.hand.hand_types import MOST_FINGERS, NAME, RESERVED, WRIST, HandFile
 from tendonfmu.errors import InputError
 from tendonfmu.files import Node, Refusal, counted, path_of, read_json, report_text
 from tendonfmu.model import Finger, read_finger
 from tendonfmu.recordings import GROUP_PER, GROUPS, LABEL
 
 FORMAT = "tendonfmu-hand-1"
-WRIST = "wrist"  # the name of the wrist among the parts
-MOST_FINGERS = 32
-RESERVED = (WRIST, "recordings", "rows")  # folders and columns have these names
 POSITIONS = ("joint_position", "joint_velocity")  # groups of the joints that fingers and wrist share
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,39}")
 _EXPECTED_NAME = "1 to 40 letters, digits, - and _, a letter first"
 
 
@@ -63,7 +59,7 @@ class Hand:
     """
 
     path: Path
-    data: Mapping[str, Any]
+    data: HandFile
     fingers: tuple[HandPart, ...]
     wrist: Wrist | None
 
@@ -168,7 +164,7 @@ def _fingers(node: Node, folder: Path) -> Iterator[HandPart]:
     for element in node.elements():
         name = element.keys(("name", "description", "columns")).member("name")
         text = name.text(_EXPECTED_NAME)
-        if not _NAME.fullmatch(text):
+        if not re.fullmatch(NAME, text):
             name.refuse(_EXPECTED_NAME)
         if text.lower() in taken | set(RESERVED):
             name.refuse(f"a name that no other finger has, and none of {', '.join(RESERVED)}")

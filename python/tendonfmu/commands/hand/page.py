@@ -15,7 +15,8 @@ from markupsafe import Markup
 
 from tendonfmu import report as reporting
 from tendonfmu.calibration import text
-from tendonfmu.commands.hand.description import WRIST, Hand, HandPart
+from tendonfmu.commands.hand.description import Hand, HandPart
+from tendonfmu.commands.hand.hand_types import WRIST
 from tendonfmu.commands.score import ScoreResult
 from tendonfmu.diagnosis import History, Names
 from tendonfmu.files import counted, html_template, listed, percent, write_text
@@ -106,7 +107,7 @@ def calibration_rows(hand: Hand, results: Sequence[PartResult]) -> list[PartRow]
 def diagnosis_rows(hand: Hand, results: Sequence[PartResult]) -> list[PartRow]:
     """Return a row for each finger: verdict, causes, error, and how much of it is beyond noise."""
 
-    def row(result: PartResult, report: Report) -> PartRow:
+    def row(result: PartResult, report: reporting.DiagnosisReport) -> PartRow:
         adequate = report["verdict"] == "adequate"
         wrong = share_that_is_wrong(report)
         causes = [" ".join(filter(None, (cause["title"], _place(result, cause)))) for cause in report["causes"]]
@@ -196,10 +197,10 @@ def score_rows(scores: Mapping[str, ScoreResult], failed: Mapping[str, str]) -> 
     return sorted(rows, key=lambda row: -row.badness)
 
 
-def share_that_is_wrong(report: Report) -> float:
+def share_that_is_wrong(report: reporting.DiagnosisReport) -> float:
     """Return the share of a finger's error that is more than noise: what causes explain, and what nothing does."""
-    gain, unexplained = report["gain"]["value"], report["unexplained"]["share"]
-    return float(1.0 - (1.0 - gain) * math.sqrt(max(1.0 - unexplained, 0.0)))
+    gain, unexplained = report["gain"]["value"] or 0.0, report["unexplained"]["share"] or 0.0
+    return 1.0 - (1.0 - gain) * math.sqrt(max(1.0 - unexplained, 0.0))
 
 
 def shared_warnings(warnings: Mapping[str, Sequence[str]]) -> list[str]:
@@ -214,7 +215,7 @@ def shared_warnings(warnings: Mapping[str, Sequence[str]]) -> list[str]:
 # --- parts ------------------------------------------------------------------------------------------------------------
 
 
-def _rows(results: Sequence[PartResult], row: Callable[[PartResult, Report], PartRow]) -> list[PartRow]:
+def _rows(results: Sequence[PartResult], row: Callable[[PartResult, Any], PartRow]) -> list[PartRow]:
     """Return the rows, worst first; those of failed parts come last."""
     done = [row(result, result.report) for result in results if result.report is not None]
     done.sort(key=lambda each: -each.badness)
@@ -226,16 +227,16 @@ def _rows(results: Sequence[PartResult], row: Callable[[PartResult, Report], Par
     ]
 
 
-def _own(hand: Hand, result: PartResult, values: Sequence[float]) -> float:
+def _own(hand: Hand, result: PartResult, values: Sequence[float | None]) -> float:
     """Return the rms of all joints of a finger together; a shared wrist is no joint of the finger."""
-    return reporting.together(values[hand.shared_joints(result.part) :])
+    return reporting.together(reporting.column(values[hand.shared_joints(result.part) :]))
 
 
 def _mnm(value: float | None) -> str:
     return "–" if value is None else reporting.rounded(1e3 * value)
 
 
-def _place(result: PartResult, cause: Mapping[str, Any]) -> str:
+def _place(result: PartResult, cause: reporting.CauseEntry) -> str:
     """Return where a cause is, by the names of joint and tendon."""
     finger = result.part.finger
     words = [f"at {finger.joint_names[cause['joint'] - 1]}"] if cause["joint"] else []

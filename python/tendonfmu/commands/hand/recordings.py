@@ -13,7 +13,8 @@ from typing import TypeAlias
 import numpy as np
 
 from tendonfmu.arrays import Numbers
-from tendonfmu.commands.hand.description import POSITIONS, WRIST, Hand, HandPart
+from tendonfmu.commands.hand.description import POSITIONS, Hand, HandPart
+from tendonfmu.commands.hand.hand_types import WRIST
 from tendonfmu.errors import InputError, InputWarning
 from tendonfmu.files import Table, counted, is_frame, path_of, read_table, table_of_frame
 from tendonfmu.fmu import run_model

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.commands.hand.description import WRIST, Hand, read_hand
+from tendonfmu.commands.hand.description import Hand, read_hand
+from tendonfmu.commands.hand.hand_types import WRIST
 from tendonfmu.commands.hand.recordings import HandRecording, split_recording
 from tendonfmu.commands.run import RunResult
 from tendonfmu.commands.run import run as run_finger

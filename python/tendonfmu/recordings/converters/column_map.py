@@ -3,7 +3,7 @@
 Each of our columns is  sign · scale · factor of the unit · (reading − offset); `wrap` first takes the jumps out of
 readings of a counter that starts again. Where `convert inspect` could not
 decide, a value is "?", which is refused here. docs/reference/commands/convert.md explains the keys, and
-`schema/map.schema.json` defines them for editors.
+`schema/map.schema.json`, made from `map_types`, is for editors.
 """
 
 from __future__ import annotations

@@ -1,0 +1,117 @@
+"""The JSON Schema of a rig, from the table of its keys, `rig.json`.
+
+A row is a number (`least` or `above`, `most`, `whole`), a list of numbers (`length`; `each`: one number or a list), one
+of some `words`, an object, a list of objects (`kind`; `item` is the text of one; `gaps`: some are null), or what
+`schema` says. `[k]` is any element of a list. What is required is so without a base; in the element of a list always.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from facts import Row, last
+from finger_schema import DIALECT, NULL, Schema, list_of, number_of
+
+TABLE = Path(__file__).with_name("rig.json")
+
+
+def rig_schema() -> Schema:
+    table, rows = _table(), rig_rows()
+    schema = _object(rows, "", {"text": table["description"], "required": True})
+    motion = schema["properties"]["motion"]
+    motion["allOf"] = [_motion(kind, keys) for kind, keys in table["motions"].items()]
+    needed = _needed(rows, "")
+    needed["properties"]["motion"] |= {
+        "if": {"properties": {"kind": {"enum": ["still", "strokes"]}}},
+        "then": {"required": ["pretension"], "properties": {"pretension": {"type": "number"}}},
+    }
+    return {
+        "$schema": DIALECT,
+        "$id": "urn:tendonfmu:rig-1",
+        "title": table["title"],
+        **schema,
+        "required": ["format"],
+        "if": {"not": {"required": ["base"], "properties": {"base": {"type": "string"}}}},
+        "then": needed,
+    }
+
+
+def _table() -> Row:
+    table: Row = json.loads(TABLE.read_text(encoding="utf-8"))
+    return table
+
+
+def rig_rows() -> list[Row]:
+    """The rows in the order of the page: those of `{signal}` once for each signal that they are for."""
+    table = _table()
+    rows = table["keys"]
+    first = next(place for place, row in enumerate(rows) if "{signal}" in row["path"])
+    end = next(place for place, row in enumerate(rows) if place > first and "{signal}" not in row["path"])
+    of_signals = [
+        row | {key: row[key].format(signal=signal, unit=unit) for key in ("path", "text")}
+        for signal, unit in table["signals"].items()
+        for row in rows[first:end]
+        if signal in row.get("signals", table["signals"])
+    ]
+    return [*rows[:first], *of_signals, *rows[end:]]
+
+
+def _motion(kind: str, keys: list[str]) -> Schema:
+    others = {"required": ["file"], "properties": {"file": {"type": "string"}}} if kind == "file" else {}
+    chosen = {"required": ["kind"], "properties": {"kind": {"const": kind}}}
+    return {"if": chosen, "then": {"propertyNames": {"enum": keys}, **others}}
+
+
+def _children(rows: list[Row], path: str) -> list[Row]:
+    return [row for row in rows if row["path"] != path and row["path"].rpartition(".")[0] == path]
+
+
+def _needed(rows: list[Row], path: str) -> Schema:
+    """What an object needs if there is no base."""
+    children = _children(rows, path)
+    inside = {last(row["path"]): _needed(rows, row["path"]) for row in children if "[k]" not in row["path"]}
+    inside = {key: needed for key, needed in inside.items() if needed}
+    needed = [last(row["path"]) for row in children if "required" in row]
+    return {**({"required": needed} if needed else {}), **({"properties": inside} if inside else {})}
+
+
+def _object(rows: list[Row], path: str, row: Row) -> Schema:
+    children = _children(rows, path)
+    needed = [last(child["path"]) for child in children if "required" in child]
+    return {
+        "description": row["text"],
+        "type": "object" if "required" in row else ["object", "null"],
+        **({"required": needed} if needed and "[k]" in path else {}),
+        "additionalProperties": False,
+        "properties": {last(child["path"]): _of_key(rows, child) for child in children},
+    }
+
+
+def _of_key(rows: list[Row], row: Row) -> Schema:
+    described: Schema = {"description": row["text"]} | ({"default": row["default"]} if "default" in row else {})
+    kind, optional, length = row.get("kind"), "required" not in row, row.get("length", 0)
+    if "schema" in row:
+        return {**row["schema"], **described}
+    if kind == "object":
+        return _object(rows, row["path"], row)
+    if kind == "list":
+        item = _object(rows, row["path"], {"text": row["item"]} | ({} if "gaps" in row else {"required": True}))
+        return list_of(length, item, optional) | described
+    if kind == "pushes":
+        one = _object(rows, f"{row['path']}[k]", {"text": row["item"], "required": True})
+        recipe = _object(rows, row["path"], {"text": row["recipe"], "required": True})
+        return {"anyOf": [{"type": "array", "items": one}, recipe, NULL]} | described
+    if "words" in row:
+        words = {"enum": row["words"]}
+        if kind == "some":
+            return {"type": ["array", "null"], "uniqueItems": True, "items": words} | described
+        if kind == "one or several":
+            return {"anyOf": [words, {"type": "array", "minItems": 1, "items": words}, NULL]} | described
+        return {"enum": [*row["words"], None] if optional else row["words"]} | described
+    one = number_of(row, optional and not length and "each" not in row)
+    if "each" in row:
+        return {"anyOf": [one, list_of((1, row["each"]), one, False), NULL]} | described
+    if length:
+        return list_of((length, length) if isinstance(length, int) else length, one, optional) | described
+    return one | described
