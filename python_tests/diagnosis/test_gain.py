@@ -20,7 +20,7 @@ from fit_data import make_recording, wavy_forces, wavy_motion
 from repository_paths import ROOT
 from tendonfmu.diagnosis.change_search import gain_of, interval_of
 from tendonfmu.diagnosis.contact_scan import detection_gain
-from tendonfmu.diagnosis.effects import CANDIDATES, Place, Term
+from tendonfmu.diagnosis.effects import MECHANISMS, Place, Term
 from tendonfmu.diagnosis.extension_fit import (
     FitSettings,
     cause_parameters,
@@ -67,7 +67,7 @@ def prepared(truth: dict[str, Any], seed: int, holdout: float = 0.0, seconds: fl
 
 
 def accepted(name: str, place: Place, magnitudes: list[float], **shape: float) -> Term:
-    candidate = next(each for each in CANDIDATES if each.name == name)
+    candidate = next(each for each in MECHANISMS if each.name == name)
     return Term(candidate, place, shape, magnitudes)
 
 

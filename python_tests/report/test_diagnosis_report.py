@@ -12,7 +12,8 @@ import jsonschema
 import pytest
 
 import diagnosis_examples as examples
-from tendonfmu.diagnosis.names import reported_causes, title_of
+from tendonfmu.diagnosis.effects import title_of
+from tendonfmu.diagnosis.names import reported_causes
 from tendonfmu.diagnosis.result import CausePlace, Diagnosis, ModelErrors
 from tendonfmu.diagnosis.sizes import size_of
 from tendonfmu.files import report_text

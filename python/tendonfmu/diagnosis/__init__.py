@@ -17,13 +17,14 @@ from tendonfmu.lazy_exports import lazy_exports
 if TYPE_CHECKING:
     from .contact_scan import events_of, without_events
     from .diagnosis import diagnose
-    from .effects.candidate import Where
+    from .effects.mechanism import Where
     from .effects.places import thresholds
+    from .effects.table import CONTACT, UNKNOWN, ZERO, title_of
     from .effects.words import NBSP, quantity
     from .experiments.motion import discriminating_motion
     from .extension_fit import FitSettings, with_known
     from .history import History, Line, diagnose_history, share_of
-    from .names import CONTACT, UNKNOWN, ZERO, Names, at_place, names_in, numbered, reported_causes, title_of
+    from .names import Names, at_place, names_in, numbered, reported_causes
     from .result import (
         Cause,
         CausePlace,

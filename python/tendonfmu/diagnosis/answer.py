@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from scipy.signal import welch
 
 from tendonfmu.arrays import Flags, Numbers
-from tendonfmu.diagnosis.effects import BY_NAME, Place, Where
+from tendonfmu.diagnosis.effects import BY_NAME, Place, Where, title_of
 from tendonfmu.diagnosis.extension_fit import FitSettings
 from tendonfmu.diagnosis.gain import Gain
 from tendonfmu.diagnosis.inputs import Input
-from tendonfmu.diagnosis.result import Cause, CausePlace, Diagnosis, Evidence, ResidualView, Unexplained
+from tendonfmu.diagnosis.result import Cause, Diagnosis, Evidence, ResidualView, Unexplained
 from tendonfmu.diagnosis.samples import Series
-from tendonfmu.diagnosis.selection import SIGNIFICANCE
+from tendonfmu.diagnosis.selection import SIGNIFICANCE, Judged
 from tendonfmu.statistics import Interval, make_folds
 from tendonfmu.tasks import Phases
 
@@ -302,14 +302,26 @@ def _verdict(explained: bool, unknown: bool) -> str:
     return "unexplained" if unknown else "adequate"
 
 
-def reported(cause: Cause, compared: Compared) -> Cause:
-    """Return a cause with all its numbers, its rivals and its picture."""
-    return replace(
-        cause,
-        parameters={path: number for place in cause.places for path, number in place.parameters.items()},
-        confusable_with=tuple(other.where for other in cause.alike),
-        evidence=evidence(cause.effect, [Place(place.joint, place.tendon) for place in _places(cause)], compared),
-    )
+def cause_of(found: Judged, **numbers: Any) -> Cause:
+    """Return a cause with its words and its rivals; `numbers` are further fields of `Cause`."""
+    effect, rivals = found.effect, tuple(other.where for other in found.alike)
+    known: dict[str, Any] = {"gain": found.gain, "confusable_with": rivals, "sensors": found.sensors} | numbers
+    return Cause(found.where, title_of(effect), _explanation(found), found.p_value, **known)
+
+
+def _explanation(found: Judged) -> str:
+    """Say what the effect is; a number that the description has is different now."""
+    if found.effect not in BY_NAME or found.terms:
+        return BY_NAME[found.effect].explanation if found.terms else ""
+    _, look, at = BY_NAME[found.effect].explanation.partition("Look ")
+    return f"The description has this effect; its number is different now. {look}{at}".strip()
+
+
+def reported(found: Judged, compared: Compared, **numbers: Any) -> Cause:
+    """Return a cause with its picture."""
+    # a change is free at all of its places together
+    places = [found.where.place] if compared.reference is not None else [term.place for term in found.terms]
+    return cause_of(found, **numbers, evidence=evidence(found.effect, places or [found.where.place], compared))
 
 
 def not_taken(causes: Iterable[Cause], experiments: Mapping[Where, str], seconds: float) -> dict[str, Any]:
@@ -317,7 +329,6 @@ def not_taken(causes: Iterable[Cause], experiments: Mapping[Where, str], seconds
     # `experiments` names those planned; `seconds` of unseen motion were judged
     small, uncertain = list[Cause](), list[Cause]()
     for cause in causes:
-        cause = replace(cause, places=_places(cause), confusable_with=tuple(other.where for other in cause.alike))
         if cause.gain.low > 0.0 or cause.p_value >= SIGNIFICANCE:
             small.append(cause)
         else:
@@ -333,10 +344,3 @@ def _longer(gain: Interval, seconds: float) -> str:
         return ""
     needed = 10.0 * math.ceil(MARGIN * factor * seconds / 10.0)
     return f"test on {needed:.0f} s of such motion, in place of {seconds:.0f} s"
-
-
-def _places(cause: Cause) -> tuple[CausePlace, ...]:
-    """Return the places of the terms of a cause, without numbers; a change is free at all of its places together."""
-    if cause.changed is not None or not cause.terms:
-        return (CausePlace(cause.joint, cause.tendon, {}),)
-    return tuple(CausePlace(*term.place, {}) for term in cause.terms)

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.arrays import Data, Flags, Numbers
-from tendonfmu.diagnosis.effects import CANDIDATES, Candidate, Place, Term, Where, by_name
+from tendonfmu.diagnosis.effects import MECHANISMS, Mechanism, Place, Term, Where, by_name
 from tendonfmu.diagnosis.extension_fit import (
     FitSettings,
     FittedModel,
@@ -53,9 +53,9 @@ class Base:
     model: FittedModel  # fitted with `start`
     settings: FitSettings
 
-    def look(self, model: FittedModel, candidates: Sequence[Candidate] = CANDIDATES) -> View:
+    def look(self, model: FittedModel, mechanisms: Sequence[Mechanism] = MECHANISMS) -> View:
         """Return what a model that was fitted to the samples lacks."""
-        return look(model.data, self.samples, self.least, candidates, model).as_described
+        return look(model.data, self.samples, self.least, mechanisms, model).as_described
 
     def left_unseen(self, model: FittedModel) -> Numbers:
         """Return Σ e² of a model on unseen stretches, (N·m)² [K]."""

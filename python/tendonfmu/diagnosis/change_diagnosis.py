@@ -14,7 +14,7 @@ import numpy as np
 from scipy import stats
 
 from tendonfmu.arrays import Data, Flags, Numbers
-from tendonfmu.diagnosis.answer import Asked, Compared, answered, not_taken, reported
+from tendonfmu.diagnosis.answer import Asked, Compared, answered, cause_of, not_taken, reported
 from tendonfmu.diagnosis.base import Base
 from tendonfmu.diagnosis.change_search import ChangeSearch, interval_of
 from tendonfmu.diagnosis.contact_scan import event_gain, events_of, unusual, without_events
@@ -24,16 +24,19 @@ from tendonfmu.diagnosis.gain import Gain, measure_gain
 from tendonfmu.diagnosis.names import names_in
 from tendonfmu.diagnosis.result import (
     Cause,
+    CausePlace,
     ChangedSize,
     Diagnosis,
     Event,
     Experiment,
+    Invisible,
     SteadyLoad,
     Unexplained,
+    by_gain,
     with_error,
 )
 from tendonfmu.diagnosis.samples import Samples, Series
-from tendonfmu.diagnosis.selection import SIGNIFICANCE, absorbed_effects, by_gain, confirmed
+from tendonfmu.diagnosis.selection import SIGNIFICANCE, Judged, confirmed, invisible_effects, names_needed
 from tendonfmu.diagnosis.sizes import sized, with_sizes_by_recording
 from tendonfmu.statistics import Interval, gain_interval, make_folds
 
@@ -161,9 +164,8 @@ class _Changes:
         """Return the sizes of effects at places in the new recordings, all of them free."""
         search = self._search = self._searching(self._without_events())
         search.free(keys)
-        changes = [search.certain(k) for k in range(len(search.causes))]
-        listed = [sized(search, changes, k) for k in range(len(changes))]
-        return [(change.where, change.changed) for change in listed if change.changed is not None]
+        search.causes = [search.certain(k) for k in range(len(search.causes))]
+        return [(change.where, sized(search, k)["changed"]) for k, change in enumerate(search.causes)]
 
     def _without_events(self) -> Samples:
         """Return the samples without contact and stalls."""
@@ -185,44 +187,39 @@ class _Changes:
 
     # --- verified on unseen data ---
 
-    def _verified(self) -> list[Cause]:
+    def _verified(self) -> list[Judged]:
         """Drop the changes that unseen data do not confirm, and return them."""
         search = self._search
         # blocks of tests [B]; without tests, the held-out parts of the new recordings are judged in turn
         unseen = search.sides.test if self._given.tests else None
 
-        def judge(changes: list[Cause]) -> tuple[list[Cause], list[int]]:
+        def judge(changes: list[Judged]) -> tuple[list[Judged], list[int]]:
             if len(changes) < len(search.causes):
                 search.keep(changes)
             grams = search.grams(unseen=unseen)
             after, stretch = grams.unseen_residual(), grams.counted_stretch
             without = [search.grams(k, unseen).unseen_residual() for k in range(len(search.causes))]
             gains = [interval_of(left, after, stretch) for left in without]
-            beside = [search.certain(k) for k in range(len(search.causes))]
-            order = sorted(range(len(gains)), key=lambda k: -gains[k].value)
-            named = [search.causes[k].effect for k in order]
+            judged = [replace(change, gain=gain) for change, gain in zip(search.causes, gains, strict=True)]
+            needed = names_needed(judged)
             weak = [
                 k
-                for place, k in enumerate(order)
-                if not gains[k].low > 0.0
-                or beside[k].p_value >= SIGNIFICANCE
+                for k, (cause, left) in enumerate(zip(judged, without, strict=True))
+                if not cause.gain.low > 0.0
+                or search.certain(k).p_value >= SIGNIFICANCE
                 or not search.matters(
-                    gains[k].value,
-                    search.error * float(np.linalg.norm(without[k]) / np.linalg.norm(after)),
-                    named[place],
-                    named[:place],
+                    cause.gain.value, search.error * float(np.linalg.norm(left) / np.linalg.norm(after)), needed[k]
                 )
             ]
-            return [replace(change, gain=gain) for change, gain in zip(search.causes, gains, strict=True)], weak
+            return judged, weak
 
         changes, dropped = confirmed(search.causes, judge)
-        certain = [replace(search.certain(k), gain=change.gain) for k, change in enumerate(changes)]
-        search.keep(by_gain(certain))
+        search.keep(by_gain(replace(search.certain(k), gain=change.gain) for k, change in enumerate(changes)))
         return dropped
 
     # --- the models ---
 
-    def _learned(self) -> list[Cause]:
+    def _learned(self) -> list[Judged]:
         """Return the changes as learned without the samples that they are judged on."""
         search = self._search
         held = np.zeros(len(search.series.time), dtype=bool)
@@ -234,13 +231,13 @@ class _Changes:
             return search.causes
         return search.moved_on(search.grams(unseen=held))
 
-    def _written(self, changes: Sequence[Cause]) -> Data:
+    def _written(self, changes: Sequence[Judged]) -> Data:
         """Return the reference model with changes, with what is known of its numbers."""
         return with_known(self._search.now_data(changes), self._given.whole, self._asked.settings)
 
     # --- what is reported ---
 
-    def _result(self, dropped: Sequence[Cause]) -> Diagnosis:
+    def _result(self, dropped: Sequence[Judged]) -> Diagnosis:
         given, search = self._given, self._search
         learned = self._learned()
         models = [self._search.now_data(learned[:k]) for k in range(len(learned) + 1)]
@@ -253,7 +250,7 @@ class _Changes:
             return self._result(dropped)
         compared = self._compared()
         causes = [
-            reported(with_sizes_by_recording(search, k, sized(search, search.causes, k)), own)
+            reported(search.causes[k], own, **with_sizes_by_recording(search, k, sized(search, k)))
             for k, own in enumerate(compared)
         ]
         views, load = self._views(), self._load()
@@ -267,11 +264,14 @@ class _Changes:
             noise_floor=tuple(float(value) for value in np.minimum(self._floor(), gain.extended.test_rms)),
             floor_source="what remains on unseen stretches without the errors that both recordings share",
             **not_taken(
-                [replace(change, terms=(), alike=(), size="") for change in [*dropped, *search.refused]],
+                [
+                    cause_of(change, confusable_with=(), places=(CausePlace(*change.where.place, {}),))
+                    for change in [*dropped, *search.refused]
+                ],
                 {},
                 sum(recording.duration for recording in given.tests or self._held),
             ),
-            invisible=tuple(absorbed_effects(search.selection, REPEAT)),
+            invisible=self._invisible(),
             events=self._events,
             experiment=Experiment(self._next(causes)),
             detection=None,
@@ -373,6 +373,9 @@ class _Changes:
         is_now = self._search.stretches_now
         return np.asarray(np.sqrt(squares[is_now].sum(axis=0) / max(float(rows[is_now].sum()), 1.0)))
 
+    def _invisible(self) -> tuple[Invisible, ...]:
+        return tuple(replace(hidden, experiment=REPEAT) for _, hidden in invisible_effects(self._search.selection))
+
     def _next(self, causes: Sequence[Cause]) -> str:
         search = self._search
         pulls = any(not tendon.get("bidirectional") for tendon in self._given.finger.data["tendons"])
@@ -381,6 +384,6 @@ class _Changes:
                 f"{REPEAT} Then repeat them at half and at twice the pretension: effects that grow with the tendon "
                 "force then differ from those that do not."
             )
-        if not search.repeated and (causes or absorbed_effects(search.selection, REPEAT)):
+        if not search.repeated and (causes or self._invisible()):
             return f"{REPEAT} Then their difference shows the change alone."
         return ""

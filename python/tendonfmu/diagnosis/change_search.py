@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from tendonfmu.arrays import Array, Data, Flags, Numbers
-from tendonfmu.diagnosis.candidate_columns import number_hypotheses, numbers_of, with_numbers
+from tendonfmu.diagnosis.candidate_columns import Candidate, number_hypotheses, numbers_of, with_numbers
 from tendonfmu.diagnosis.effects import Term, Where
 from tendonfmu.diagnosis.extension_fit import extended_description
 from tendonfmu.diagnosis.reference import (
@@ -27,12 +27,13 @@ from tendonfmu.diagnosis.reference import (
     less_reference,
     outside,
 )
-from tendonfmu.diagnosis.result import Cause, with_error
+from tendonfmu.diagnosis.result import with_error
 from tendonfmu.diagnosis.samples import Samples, exact_model
 from tendonfmu.diagnosis.selection import (
     CERTAIN,
     SIGNIFICANCE,
     CauseSearch,
+    Judged,
     LeastSizes,
     Selection,
     is_alike,
@@ -100,14 +101,11 @@ class ChangeSearch(CauseSearch):
         self._selection: Selection | None = None
         self._whole = self.error
 
-    def _candidates(self) -> list[Cause]:
+    def _candidates(self) -> list[Candidate]:
         count, own = self._view.columns.values.shape[2], len(self.numbers)
-        missing = [
-            replace(cause, direction=replace(cause.direction, mix=np.pad(cause.direction.mix, ((0, own), (0, 0)))))
-            for cause in self._view.candidates
-        ]
+        missing = [replace(each, mix=np.pad(each.mix, ((0, own), (0, 0)))) for each in self._view.candidates]
         present = number_hypotheses(self.numbers, count + own, count)
-        return sorted([*missing, *present], key=lambda cause: cause.direction.level)
+        return sorted([*missing, *present], key=lambda candidate: candidate.level)
 
     def _both(self) -> Array:
         """Return the columns of what the description lacks, then those of its own numbers [B, n, c + u]."""
@@ -126,21 +124,21 @@ class ChangeSearch(CauseSearch):
 
     # --- rounds ---
 
-    def _try_next(self, tried: set[str]) -> tuple[Cause, bool] | None:
+    def _try_next(self, tried: set[str]) -> tuple[Judged, bool] | None:
         best = self._best(tried)
         if best is None or self.selection.gain(best)[0] < self._least_gain:
             return None
         change, certain = self._named(best)
-        named = [cause.effect for cause in self.causes]
-        if not certain or not self.matters(change.gain.value, self.error, change.effect, named):
+        names = names_with(change.effect, [cause.effect for cause in self.causes])
+        if not certain or not self.matters(change.gain.value, self.error, names):
             return change, False
         self.causes.append(change)
         self._settle()
         return change, True
 
-    def _best(self, tried: set[str]) -> Cause | None:
+    def _best(self, tried: set[str]) -> Judged | None:
         """Return the candidate that lowers the error most, at the coarsest place that is as good."""
-        ranked = [cause for cause in self.selection.ranked() if cause.effect not in tried]
+        ranked = self.selection.ranked(tried)
         if not ranked:
             return None
         best = self.selection.refined(ranked[0].effect)
@@ -150,11 +148,11 @@ class ChangeSearch(CauseSearch):
                 best = self.selection.refined(present.effect)
         return self._at_best_place(best) if len(self.new_recordings) > 1 else best
 
-    def _explains_as_much(self, cause: Cause, best: Cause) -> bool:
+    def _explains_as_much(self, cause: Judged, best: Judged) -> bool:
         least = AS_MUCH * (self.selection.base - best.unseen).sum()
         return is_alike(cause.unseen, best.unseen) or (self.selection.base - cause.unseen).sum() >= least
 
-    def _at_best_place(self, best: Cause) -> Cause:
+    def _at_best_place(self, best: Judged) -> Judged:
         """Return, of places that are nearly as good, the one with the smallest error."""
         # The size is free in each new recording here, because a growing change differs from one recording to the next.
         options = [best, *self.selection.near(best)]
@@ -167,7 +165,7 @@ class ChangeSearch(CauseSearch):
         masks = [(recording == number)[:, None, None] for number in self.new_recordings]
         parts, places, at = [], [], 0
         for option in options:
-            column = chosen.table[:, :, u:] @ option.direction.mix.astype(np.float32)
+            column = chosen.table[:, :, u:] @ option.mix.astype(np.float32)
             own = np.concatenate([column * mask for mask in masks], axis=2)
             parts.append(own)
             places.append(slice(at, at + own.shape[2]))
@@ -177,16 +175,16 @@ class ChangeSearch(CauseSearch):
         errors = []
         for option, place in zip(options, places, strict=True):
             mix = np.eye(at)[:, place]
-            low, high = (np.tile(end, len(masks)) for end in (option.direction.low, option.direction.high))
+            low, high = (np.tile(end, len(masks)) for end in (option.low, option.high))
             errors.append(grams.error(mix, low, high)[0])
         return options[int(np.argmin(errors))]
 
-    def _named(self, cause: Cause) -> tuple[Cause, bool]:
+    def _named(self, cause: Judged) -> tuple[Judged, bool]:
         """Return the change and whether it is certain: a gain of more than two standard errors and a small p-value."""
-        grams, own = self.selection.grams, cause.direction
-        _, by_fold = grams.error(own.mix, own.low, own.high)
-        gain, error = gain_of(grams.unseen_residual(), grams.unseen_residual(own.mix, by_fold), grams.counted_stretch)
-        p_value, covariance = self.certainty_of(grams, own.mix)
+        grams = self.selection.grams
+        _, by_fold = grams.error(cause.mix, cause.low, cause.high)
+        gain, error = gain_of(grams.unseen_residual(), grams.unseen_residual(cause.mix, by_fold), grams.counted_stretch)
+        p_value, covariance = self.certainty_of(grams, cause.mix)
         alike = self.selection.alike(cause, self.selection.ranked())
         change = replace(cause, covariance=covariance, gain=with_error(gain, error), p_value=p_value, alike=alike)
         return change, gain > CERTAIN * error and p_value < SIGNIFICANCE
@@ -196,11 +194,10 @@ class ChangeSearch(CauseSearch):
         """Root of Σ e² on held-out parts of the new recordings, with the changes so far, N·m."""
         return float(np.sqrt(self.selection.base.sum()))
 
-    def matters(self, gain: float, before: float, effect: str, named: Sequence[str]) -> bool:
-        """Return whether a change gains enough."""
+    def matters(self, gain: float, before: float, names: int) -> bool:
+        """Return whether a change gains enough; `names` is how many names count with it."""
         # It must also remove enough of the whole difference, so that small remnants of a large change are not named.
-        least = self._least_gain
-        return gain >= least * names_with(effect, named) and gain * before >= least * self._whole
+        return gain >= self._least_gain * names and gain * before >= self._least_gain * self._whole
 
     def _settle(self) -> None:
         for _ in range(STEPS):
@@ -211,31 +208,29 @@ class ChangeSearch(CauseSearch):
         """Free these effects at these places in the new recordings, whether they are certain or not."""
         for key in keys:
             grams = self.selection.grams
-            own = [cause for cause in self.candidates if cause.where == key]
+            own = [candidate for candidate in self.candidates if candidate.where == key]
             if own:
-                bounds = [(cause.direction.mix, cause.direction.low, cause.direction.high) for cause in own]
-                best = own[int(np.argmin([grams.error(*bound)[0] for bound in bounds]))]
-                self.causes.append(replace(best, magnitudes=np.zeros(best.direction.mix.shape[1])))
+                best = min(own, key=lambda candidate: grams.error(candidate.mix, candidate.low, candidate.high)[0])
+                self.causes.append(Judged(**vars(best), magnitudes=np.zeros(best.mix.shape[1])))
                 self._settle()
 
-    def certain(self, number: int) -> Cause:
+    def certain(self, number: int) -> Judged:
         """Return a change with the covariance and p-value that it has together with all others."""
         change, grams = self.causes[number], self.grams(number)
-        own = change.direction
-        mix = own.mix[own.mix.any(axis=1)]  # only its own columns are candidates
+        mix = change.mix[change.mix.any(axis=1)]  # only its own columns are candidates
         p_value, covariance = self.certainty_of(grams, mix)
         return replace(change, covariance=covariance, p_value=p_value)
 
-    def moved_on(self, grams: Grams) -> list[Cause]:
+    def moved_on(self, grams: Grams) -> list[Judged]:
         """Return the changes with updated magnitudes, from a solution in which their columns are shared."""
         sizes = [len(change.magnitudes) for change in self.causes]
         steps = np.split(grams.refitted[-sum(sizes) :], np.cumsum(sizes)[:-1]) if sizes else []
         return [
-            replace(change, magnitudes=np.clip(change.magnitudes + own, change.direction.low, change.direction.high))
+            replace(change, magnitudes=np.clip(change.magnitudes + own, change.low, change.high))
             for change, own in zip(self.causes, steps, strict=True)
         ]
 
-    def keep(self, changes: Sequence[Cause]) -> None:
+    def keep(self, changes: Sequence[Judged]) -> None:
         """Continue with these changes only."""
         self.causes = list(changes)
         self.causes = self.moved_on(self.grams())
@@ -252,7 +247,7 @@ class ChangeSearch(CauseSearch):
 
     def _look(self) -> Selection:
         known = {change.effect for change in self.causes}
-        left = [cause for cause in self.candidates if cause.effect not in known]
+        left = [candidate for candidate in self.candidates if candidate.effect not in known]
         products, judged = self._products(None)
         chosen = products.chosen(self._together(self.causes), None)
         return Selection(Grams(chosen, self._target_now(), self._scales(self.causes), judged), left, self._view.least)
@@ -277,7 +272,7 @@ class ChangeSearch(CauseSearch):
         target = self._target_now()
         if without is not None:
             alone = self.causes[without]
-            used = np.flatnonzero(alone.direction.mix.any(axis=1))
+            used = np.flatnonzero(alone.mix.any(axis=1))
             target = target + self._values @ self._mixed(alone)
         products, judged = self._products(unseen)
         return Grams(products.chosen(self._together(kept), used), target, self._scales(kept), judged)
@@ -312,14 +307,14 @@ class ChangeSearch(CauseSearch):
     def _target_now(self) -> Numbers:
         return self._target - self.moved() if self.causes else self._target
 
-    def _together(self, changes: Sequence[Cause]) -> Numbers:
+    def _together(self, changes: Sequence[Judged]) -> Numbers:
         """Return all columns of the changes [c, k]."""
         empty = np.zeros((self._values.shape[2], 0))
-        return np.concatenate([empty, *(change.direction.mix for change in changes)], axis=1)
+        return np.concatenate([empty, *(change.mix for change in changes)], axis=1)
 
-    def _scales(self, changes: Sequence[Cause]) -> Numbers:
+    def _scales(self, changes: Sequence[Judged]) -> Numbers:
         """Return the scales of the shared columns; columns of changes are free."""
-        free = sum(change.direction.mix.shape[1] for change in changes)
+        free = sum(change.mix.shape[1] for change in changes)
         return np.concatenate([self._scale, np.full(free, np.nan)])
 
     def _products(self, unseen: Flags | None) -> tuple[Products, Flags]:
@@ -330,21 +325,21 @@ class ChangeSearch(CauseSearch):
             self._known[key] = (Products(folds, self._shared, self._values, self.samples.splines), judged)
         return self._known[key]
 
-    def terms(self, changes: Sequence[Cause]) -> list[Term]:
+    def terms(self, changes: Sequence[Judged]) -> list[Term]:
         """Return the terms that changes add to the description of now."""
         return [term for change in changes for term in change.scaled()]
 
-    def added(self, changes: Sequence[Cause]) -> Numbers:
+    def added(self, changes: Sequence[Judged]) -> Numbers:
         """Return what changes add to the numbers that the description has [u]."""
         first = self._view.columns.values.shape[2]
         parts = [np.zeros(len(self.numbers)), *(self._mixed(change)[first:] for change in changes)]
         return np.asarray(np.sum(parts, axis=0))
 
     @staticmethod
-    def _mixed(change: Cause) -> Numbers:
-        return np.asarray(change.direction.mix @ change.magnitudes)
+    def _mixed(change: Judged) -> Numbers:
+        return np.asarray(change.mix @ change.magnitudes)
 
-    def now_data(self, changes: Sequence[Cause] | None = None) -> dict[str, Any]:
+    def now_data(self, changes: Sequence[Judged] | None = None) -> dict[str, Any]:
         """Return the description of now, derived from that of the reference."""
         taken = self.causes if changes is None else changes
         return dict(extended_description(with_numbers(self.data, self.added(taken)), self.terms(taken)))
@@ -384,7 +379,7 @@ class ChangeSearch(CauseSearch):
 
     def column(self, number: int) -> Numbers:
         """Return the columns of a change, also in the reference [B, n, d]."""
-        return np.asarray(self._both() @ self.causes[number].direction.mix)
+        return np.asarray(self._both() @ self.causes[number].mix)
 
     # --- certainty ---
 
@@ -404,11 +399,11 @@ class ChangeSearch(CauseSearch):
         return min(1.0, p * self.tried), np.asarray(inverse @ spreads[least] @ inverse)
 
 
-def _share_bounds(change: Cause) -> tuple[Numbers, Numbers]:
+def _share_bounds(change: Judged) -> tuple[Numbers, Numbers]:
     """Return the bounds of the share [1] within which all magnitudes are within theirs."""
     moved = change.magnitudes != 0.0
-    size, own = change.magnitudes[moved], change.direction
-    ends = np.sort(np.stack([own.low[moved] / size, own.high[moved] / size]), axis=0)
+    size = change.magnitudes[moved]
+    ends = np.sort(np.stack([change.low[moved] / size, change.high[moved] / size]), axis=0)
     return np.array([ends[0].max(initial=-np.inf)]), np.array([ends[1].min(initial=np.inf)])
 
 

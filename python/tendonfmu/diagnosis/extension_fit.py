@@ -16,7 +16,7 @@ import numpy as np
 
 from tendonfmu.arrays import Array, Data, Numbers
 from tendonfmu.diagnosis.effects import Place, Term, by_name
-from tendonfmu.diagnosis.effects.candidate import sides_at
+from tendonfmu.diagnosis.effects.mechanism import sides_at
 from tendonfmu.diagnosis.effects.terms import changed_law
 from tendonfmu.diagnosis.result import with_error
 from tendonfmu.diagnosis.samples import Samples
@@ -58,9 +58,9 @@ class MemoryTerm(Term):
         elements = [row for row in present if row["effect"] == PRESLIDING]
         others = [row for row in present if row["effect"] not in (PRESLIDING, CORDS)]
         cords = [row for row in present if row["effect"] == CORDS]
-        if self.candidate.name == PRESLIDING:
+        if self.mechanism.name == PRESLIDING:
             elements = [dict(row) for row in self.rows]
-        elif self.candidate.name == RELAXATION:
+        elif self.mechanism.name == RELAXATION:
             times = [row["relaxation_time"] for row in self.rows]
             elements = [{**row, "relaxation_time": time} for row, time in zip(elements, times, strict=True)]
         else:
@@ -92,7 +92,7 @@ def memory_of(data: Data) -> list[Row]:
 
 def needs_presliding(term: Term) -> bool:
     """Return whether a term is part of a memory that presliding has to be there for."""
-    return term.candidate.name in (RELAXATION, CORDS)
+    return term.mechanism.name in (RELAXATION, CORDS)
 
 
 def _term(name: str, rows: tuple[Row, ...]) -> MemoryTerm:

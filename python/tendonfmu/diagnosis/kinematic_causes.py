@@ -18,13 +18,13 @@ import numpy as np
 from scipy.special import ndtr
 
 from tendonfmu.arrays import Data, Numbers
-from tendonfmu.diagnosis.effects import Where
-from tendonfmu.diagnosis.effects.candidate import add_to_number, data_number
+from tendonfmu.diagnosis.effects import Where, title_of
+from tendonfmu.diagnosis.effects.mechanism import add_to_number, data_number
+from tendonfmu.diagnosis.effects.table import ENCODER, ZERO
 from tendonfmu.diagnosis.effects.words import NBSP, quantity
 from tendonfmu.diagnosis.inputs import Input
-from tendonfmu.diagnosis.names import ENCODER, ZERO, title_of
-from tendonfmu.diagnosis.result import Cause, CausePlace, ChangedSize, Diagnosis
-from tendonfmu.diagnosis.selection import SIGNIFICANCE, by_gain
+from tendonfmu.diagnosis.result import Cause, CausePlace, ChangedSize, Diagnosis, by_gain
+from tendonfmu.diagnosis.selection import SIGNIFICANCE
 from tendonfmu.diagnosis.tendon_equation import (
     ARM,
     COUPLING,
@@ -184,7 +184,7 @@ class KinematicCauses:
         )
         numbers = {path: number for place in places for path, number in place.parameters.items()}
         intervals = {off.number.path: off.size.now for off in self.off if off.number.path in numbers}
-        return replace(cause, places=places, parameters=numbers, intervals=intervals)
+        return replace(cause, places=places, intervals=intervals)
 
     def _experiments(self) -> Iterator[str]:
         effects = {off.where.effect for off in self.off}

@@ -9,22 +9,11 @@ import numpy as np
 
 from tendonfmu.arrays import Data
 from tendonfmu.diagnosis.contact_scan import LEVEL as SCAN_LEVEL
-from tendonfmu.diagnosis.effects import Where
-from tendonfmu.diagnosis.effects.table import BY_NAME
+from tendonfmu.diagnosis.effects import Where, title_of
+from tendonfmu.diagnosis.effects.table import CONTACT, UNKNOWN
 from tendonfmu.diagnosis.effects.words import quantity
 from tendonfmu.diagnosis.result import Cause, Diagnosis
 from tendonfmu.files import counted
-
-CONTACT, UNKNOWN = "contact", "unknown"
-ENCODER, ZERO = "encoder_offset", "zero"  # without a term in a model of torques
-LOAD = "load"  # a contact that lasts for the whole recording; only in a comparison with a reference
-TITLES = {
-    LOAD: "a new load on the finger, or a sensor's zero that has moved",
-    CONTACT: "something touches the finger, or stops it",
-    UNKNOWN: "something that no known effect explains",
-    ENCODER: "the joint's encoder is off",
-    ZERO: "the zero of a tendon's position is off",
-}
 
 
 @dataclass(frozen=True)
@@ -63,13 +52,6 @@ def names_in(data: Data) -> Names:
     return Names(*(tuple(str(part.get("name") or "") for part in parts) for parts in kinds))
 
 
-def title_of(effect: str) -> str:
-    """Describe an effect of docs/reference/commands/diagnose.md in a few plain words."""
-    if effect in BY_NAME:
-        return BY_NAME[effect].title
-    return TITLES.get(effect, effect.replace("_", " "))
-
-
 def at_place(title: str, where: Where, names: Names) -> str:
     """Add the place to a title, such as "friction grows with the force, at joint 1 (mcp)"."""
     place = names.place(where)
@@ -79,6 +61,7 @@ def at_place(title: str, where: Where, names: Names) -> str:
 # --- causes that a report lists ---------------------------------------------------------------------------------------
 
 
+LOAD = "a new load on the finger, or a sensor's zero that has moved"  # a contact that lasts for the whole recording
 _EXPLANATIONS = {
     LOAD: "The mean torque that the model does not explain has moved far beyond its scatter in the reference. Friction "
     "cannot cause that. Check whether something touches or pulls the finger, and what the sensors read without a "
@@ -104,12 +87,11 @@ def _load(diagnosis: Diagnosis) -> Iterator[Cause]:
     size = load.size
     yield Cause(
         where=Where(CONTACT, load.joint),
-        title=TITLES[LOAD],
+        title=LOAD,
         explanation=_EXPLANATIONS[LOAD],
         p_value=load.p_value,
         gain=load.gain,
         confusable_with=(Where("force_offset"), Where("gravity", load.joint)),
-        parameters={},
         size=f"{quantity(size.change.value, size.unit, sign=True)} all the time",
         changed=size,
     )
@@ -126,12 +108,10 @@ def _contact(diagnosis: Diagnosis) -> Iterator[Cause]:
     seconds = sum(event.end - event.start for event in events)
     yield Cause(
         where=Where(CONTACT, joint),
-        title=TITLES[CONTACT],
+        title=title_of(CONTACT),
         explanation=_EXPLANATIONS[CONTACT],
         p_value=SCAN_LEVEL,  # probability of any event in recordings without one
         gain=gain,
-        confusable_with=(),
-        parameters={},
         size=f"{count}, {seconds:.1f} s in all",
     )
 
@@ -142,11 +122,9 @@ def _unknown(diagnosis: Diagnosis) -> Iterator[Cause]:
         return
     yield Cause(
         where=Where(UNKNOWN, int(np.argmax(rest.by_joint)) + 1 if any(rest.by_joint) else None),
-        title=TITLES[UNKNOWN],
+        title=title_of(UNKNOWN),
         explanation=_EXPLANATIONS[UNKNOWN],
         p_value=rest.p_value,
         gain=rest.gain,
-        confusable_with=(),
-        parameters={},
         size=rest.description.rstrip("."),
     )

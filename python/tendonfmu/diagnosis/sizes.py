@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -12,11 +13,12 @@ from tendonfmu.arrays import Data
 from tendonfmu.diagnosis.candidate_columns import with_numbers
 from tendonfmu.diagnosis.change_search import ChangeSearch
 from tendonfmu.diagnosis.effects import BY_NAME, Place
-from tendonfmu.diagnosis.effects.candidate import data_number
+from tendonfmu.diagnosis.effects.mechanism import data_number
 from tendonfmu.diagnosis.effects.places import thresholds
 from tendonfmu.diagnosis.effects.words import NBSP, quantity
 from tendonfmu.diagnosis.extension_fit import added_paths
-from tendonfmu.diagnosis.result import Cause, CausePlace, ChangedSize, Parameters, with_error
+from tendonfmu.diagnosis.result import CausePlace, ChangedSize, Parameters, with_error
+from tendonfmu.diagnosis.selection import Judged
 from tendonfmu.files import counted
 from tendonfmu.model import native
 from tendonfmu.statistics import Interval
@@ -85,28 +87,27 @@ def _listed(parameters: Parameters) -> str:
 # --- changes ----------------------------------------------------------------------------------------------------------
 
 
-def sized(search: ChangeSearch, changes: Sequence[Cause], number: int) -> Cause:
-    """Return one of the changes with its size, estimated together with all others."""
-    now = search.now_data(changes)
+def sized(search: ChangeSearch, number: int) -> dict[str, Any]:
+    """Return the size of one of the changes, as fields of `Cause`, estimated together with all others."""
+    changes = search.causes
+    now = search.now_data()
     units = {parameter.path: parameter.unit for parameter in native.Instance.from_description(now).parameters()}
     if changes[number].terms:
-        return _new_term(search, changes, number, now, units)
+        return _new_term(search, number, now, units)
     then = search.now_data([change for k, change in enumerate(changes) if k != number])
     return _other_number(search, changes[number], then, now, units)
 
 
-def _relative_error(change: Cause) -> float:
+def _relative_error(change: Judged) -> float:
     """Return the standard error of the whole change over its size, along the direction in which it was found."""
     value = float(np.linalg.norm(change.magnitudes))
     direction = change.magnitudes / max(value, 1e-300)
     return math.sqrt(max(float(direction @ change.covariance @ direction), 0.0)) / max(value, 1e-300)
 
 
-def _new_term(
-    search: ChangeSearch, changes: Sequence[Cause], number: int, now: Data, units: Mapping[str, str]
-) -> Cause:
+def _new_term(search: ChangeSearch, number: int, now: Data, units: Mapping[str, str]) -> dict[str, Any]:
     """Return the size of a term that the description lacks."""
-    change = changes[number]
+    changes, change = search.causes, search.causes[number]
     first, terms = len(search.terms(changes[:number])), change.scaled()
     paths = added_paths(with_numbers(search.data, search.added(changes)), search.terms(changes))[first:]
     places = tuple(
@@ -121,7 +122,7 @@ def _new_term(
     name = "amplitude" if len(main) > 1 else main[0].rsplit(".", 1)[-1]
     words = f"{size_of(change.effect, places, thresholds(now))}, beyond what the reference has"
     changed = ChangedSize(name, unit, Interval(0.0, 0.0, 0.0), size, size)
-    return replace(change, places=places, changed=changed, size=words, intervals=intervals)
+    return {"places": places, "changed": changed, "size": words, "intervals": intervals}
 
 
 def _main(paths: Sequence[str], now: Data) -> list[str]:
@@ -133,32 +134,33 @@ def _main(paths: Sequence[str], now: Data) -> list[str]:
     return [max(sizes, key=lambda path: abs(data_number(now, path)))]
 
 
-def _other_number(search: ChangeSearch, change: Cause, then: Data, now: Data, units: Mapping[str, str]) -> Cause:
+def _other_number(
+    search: ChangeSearch, change: Judged, then: Data, now: Data, units: Mapping[str, str]
+) -> dict[str, Any]:
     """Return the size of a number that the description has; `then` is the description of now without this change."""
-    mix = change.direction.mix
-    moved = np.flatnonzero(mix[mix.shape[0] - len(search.numbers) :].any(axis=1))
     by_place: dict[Place, dict[str, tuple[float, str]]] = {}
-    for k in moved:
+    for k in np.flatnonzero(change.mix[-len(search.numbers) :].any(axis=1)):
         number = search.numbers[k]
-        own = by_place.setdefault(number.place, {})
-        own[number.path] = (data_number(now, number.path), units[number.path])
+        by_place.setdefault(number.place, {})[number.path] = (data_number(now, number.path), units[number.path])
     places = tuple(CausePlace(*place, numbers) for place, numbers in by_place.items())
     paths = [path for place in places for path in place.parameters]
     main = max(paths, key=lambda path: abs(data_number(now, path) - data_number(then, path)))
     before, after = data_number(then, main), data_number(now, main)
-    name, unit = main.rsplit(".", 1)[-1], units[main]
-    if change.effect == "asymmetric_friction":
+    name, unit, apart = main.rsplit(".", 1)[-1], units[main], change.effect == "asymmetric_friction"
+    if apart:
         before, after = _difference(then, main), _difference(now, main)
         name = f"{name}, positive minus negative direction"
     error = abs(after - before) * _relative_error(change)
-    has_share = abs(before) >= LEAST_OF_NOW * abs(after) and change.effect != "asymmetric_friction"
-    share = (after - before) / before if has_share and before else math.nan
-    ends = (with_error(before, 0.0), with_error(after, error), with_error(after - before, error))
-    more = f"{100 * share:+.0f}{NBSP}%: ".replace("-", "−") if math.isfinite(share) else ""
+    more = ""
+    if before and abs(before) >= LEAST_OF_NOW * abs(after) and not apart:
+        more = f"{100 * ((after - before) / before):+.0f}{NBSP}%: ".replace("-", "−")
     where = f", at the largest of {len(places)} places" if len(places) > 1 else ""
     words = f"{more}{quantity(before, unit)} then, {quantity(after, unit)} now{where}"
+    changed = ChangedSize(
+        name, unit, with_error(before, 0.0), with_error(after, error), with_error(after - before, error)
+    )
     intervals = {main: with_error(data_number(now, main), error)}
-    return replace(change, places=places, changed=ChangedSize(name, unit, *ends), size=words, intervals=intervals)
+    return {"places": places, "changed": changed, "size": words, "intervals": intervals}
 
 
 def _difference(data: Data, path: str) -> float:
@@ -170,13 +172,14 @@ def _difference(data: Data, path: str) -> float:
     return data_number(data, path)
 
 
-def with_sizes_by_recording(search: ChangeSearch, number: int, change: Cause) -> Cause:
-    """Return a change with its size in each of several new recordings, in their order and in its unit."""
-    size = change.changed
-    if size is None or len(search.new_recordings) < 2:
-        return change
-    by = []
-    for share, error in search.shares_by_recording(number):
-        whole = size.reference.value + size.change.value * share
-        by.append(with_error(whole, abs(size.change.value) * error))
-    return replace(change, changed=replace(size, by=tuple(by)))
+def with_sizes_by_recording(search: ChangeSearch, number: int, known: dict[str, Any]) -> dict[str, Any]:
+    """Add the size in each of several new recordings, in their order."""
+    size: ChangedSize = known["changed"]
+    if len(search.new_recordings) < 2:
+        return known
+    moved = size.change.value
+    by = [
+        with_error(size.reference.value + moved * share, abs(moved) * error)
+        for share, error in search.shares_by_recording(number)
+    ]
+    return known | {"changed": replace(size, by=tuple(by))}

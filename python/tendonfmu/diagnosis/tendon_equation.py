@@ -11,8 +11,8 @@ import numpy as np
 
 from tendonfmu.arrays import Data, Flags, Indices, Numbers
 from tendonfmu.diagnosis.effects import Where
+from tendonfmu.diagnosis.effects.table import ENCODER, ZERO
 from tendonfmu.diagnosis.inputs import Input
-from tendonfmu.diagnosis.names import ENCODER, ZERO
 from tendonfmu.diagnosis.result import ChangedSize
 from tendonfmu.model import moment_arms
 from tendonfmu.recordings import Learned, Recording, TendonRouting, curves, held_on_the_way, smooth_speeds

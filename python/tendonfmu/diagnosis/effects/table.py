@@ -6,12 +6,12 @@
 from __future__ import annotations
 
 from tendonfmu.diagnosis.effects import places, terms, words
-from tendonfmu.diagnosis.effects.candidate import Candidate
+from tendonfmu.diagnosis.effects.mechanism import Mechanism
 from tendonfmu.diagnosis.effects.places import lacks_drop, lacks_sides, lacks_viscous, laws_where, nowhere
 from tendonfmu.errors import InputError
 
-CANDIDATES: tuple[Candidate, ...] = (
-    Candidate(
+MECHANISMS: tuple[Mechanism, ...] = (
+    Mechanism(
         name="viscous_friction",
         title="friction grows with speed",
         explanation=(
@@ -25,7 +25,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         find_shapes=places.laws_that_lack(lacks_viscous),
         shared=True,
     ),
-    Candidate(
+    Mechanism(
         name="stribeck",
         title="friction differs at low speed",
         explanation=(
@@ -40,7 +40,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         find_shapes=places.stribeck,
         shared=True,
     ),
-    Candidate(
+    Mechanism(
         name="asymmetric_friction",
         title="friction differs between the directions",
         explanation=(
@@ -53,7 +53,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         size=words.sides,
         find_shapes=places.laws_that_lack(lacks_sides),
     ),
-    Candidate(
+    Mechanism(
         name="edge_friction",
         title="a tendon rubs at an edge before a joint",
         explanation=(
@@ -68,7 +68,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         find_shapes=places.edge,
         shared=True,
     ),
-    Candidate(
+    Mechanism(
         name="pulley_friction",
         title="a pulley turns with friction",
         explanation=(
@@ -81,7 +81,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         size=words.of("up to {} of the tendon force", "coulomb"),
         shared=True,
     ),
-    Candidate(
+    Mechanism(
         name="joint_friction",
         title="the joint itself rubs",
         explanation=(
@@ -94,7 +94,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         size=words.of("{} of friction", "coulomb"),
         shared=True,
     ),
-    Candidate(
+    Mechanism(
         name="joint_load_friction",
         title="the joint's friction grows with the force of all tendons",
         explanation=(
@@ -107,7 +107,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         size=words.per_force("all tendon forces"),
         shared=True,
     ),
-    Candidate(
+    Mechanism(
         name="preload_friction",
         title="friction of a tendon that does not depend on its force",
         explanation=(
@@ -123,7 +123,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         find_shapes=places.sheath,
         shared=True,
     ),
-    Candidate(
+    Mechanism(
         name="load_friction",
         title="friction grows with the force of a tendon",
         explanation=(
@@ -136,7 +136,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         size=words.per_force("tendon force"),
         shared=True,
     ),
-    Candidate(
+    Mechanism(
         name="cover_stiffness",
         title="a spring pulls at the joint",
         explanation=(
@@ -149,7 +149,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         size=words.of("a spring of {}", "stiffness"),
         shared=True,
     ),
-    Candidate(
+    Mechanism(
         name="cover_hardening",
         title="the cover stiffens as it bends",
         explanation=(
@@ -162,7 +162,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         size=words.of("a cubic spring of {}", "stiffness"),
         shared=True,
     ),
-    Candidate(
+    Mechanism(
         name="gravity",
         title="the link's weight",
         explanation=(
@@ -174,7 +174,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         make=terms.row(sine=0, cosine=0),
         size=words.wave("{} at most"),
     ),
-    Candidate(
+    Mechanism(
         name="inertia",
         title="the link's inertia",
         explanation=(
@@ -186,7 +186,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         make=terms.row(inertia=0),
         size=words.of("{}", "inertia"),
     ),
-    Candidate(
+    Mechanism(
         name="inertia_variation",
         title="the inertia varies with the next joint's angle",
         explanation=(
@@ -198,7 +198,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         make=terms.row(sine=0, cosine=0),
         size=words.wave("{} more and less"),
     ),
-    Candidate(
+    Mechanism(
         name="presliding",
         title="friction builds up gradually after each reversal",
         explanation=(
@@ -211,7 +211,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         size=words.presliding,
         common=True,
     ),
-    Candidate(
+    Mechanism(
         name="relaxation",
         title="friction held at rest decays",
         explanation=(
@@ -224,7 +224,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         size=words.of("within {}", "relaxation_time"),
         common=True,
     ),
-    Candidate(
+    Mechanism(
         name="cord_stretch",
         title="cords stretch between the joints",
         explanation=(
@@ -237,7 +237,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         size=words.of("cords of {}", "stiffness"),
         common=True,
     ),
-    Candidate(
+    Mechanism(
         name="friction_drift",
         title="friction changes over time",
         explanation=(
@@ -251,7 +251,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         size=words.drift,
         find_shapes=places.drift,
     ),
-    Candidate(
+    Mechanism(
         name="force_gain",
         title="a force sensor's gain is off",
         explanation=(
@@ -264,7 +264,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         make=terms.row(-0.9, correction=0),
         size=words.correction("the true force is"),
     ),
-    Candidate(
+    Mechanism(
         name="force_offset",
         title="a force sensor's zero is off",
         explanation=(
@@ -276,7 +276,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         make=terms.row(correction=0),
         size=words.correction("the true force is"),
     ),
-    Candidate(
+    Mechanism(
         name="calibration",
         title="several sensors are a little off",
         explanation=(
@@ -289,7 +289,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         make=terms.row(),
         size=words.of("a largest correction of {}", "correction"),
     ),
-    Candidate(
+    Mechanism(
         name="time_delay",
         title="forces and positions are measured at different times",
         explanation=(
@@ -303,7 +303,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         find_shapes=places.delay,
         common=True,
     ),
-    Candidate(
+    Mechanism(
         name="moment_arm",
         title="a moment arm is off",
         explanation=(
@@ -315,7 +315,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         make=terms.row(correction=0),
         size=words.arm,
     ),
-    Candidate(
+    Mechanism(
         name="moment_arm_variation",
         title="a moment arm changes with the angle",
         explanation=(
@@ -327,7 +327,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         make=terms.row(slope=0),
         size=words.of("the arm changes by {}", "slope"),
     ),
-    Candidate(
+    Mechanism(
         name="pulley_eccentricity",
         title="a pulley is out of round",
         explanation=(
@@ -342,7 +342,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         ),
         find_shapes=places.pulley,
     ),
-    Candidate(
+    Mechanism(
         name="tendon_nonlinearity",
         title="a tendon's spring is not linear",
         explanation=(
@@ -356,7 +356,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         size=words.of("the spring stiffens by {}", "hardening"),
         find_shapes=places.hardening,
     ),
-    Candidate(
+    Mechanism(
         name="joint_coupling",
         title="a spring couples this joint and the next",
         explanation=(
@@ -374,7 +374,7 @@ CANDIDATES: tuple[Candidate, ...] = (
         ),
         find_shapes=places.either({}, {"reaction": 0.0}),
     ),
-    Candidate(
+    Mechanism(
         name="backlash",
         title="play between drive and joint",
         explanation=(
@@ -391,21 +391,34 @@ CANDIDATES: tuple[Candidate, ...] = (
 )
 CALIBRATION = "calibration"  # many corrections at once: `calibration.py`
 CALIBRATED = ("force_gain", "force_offset", "moment_arm", "time_delay")
-SHARED = tuple(candidate.name for candidate in CANDIDATES if candidate.shared)
-RUBBING = ("stribeck", *(candidate.name for candidate in CANDIDATES if "friction" in candidate.name))
+SHARED = tuple(mechanism.name for mechanism in MECHANISMS if mechanism.shared)
+_RUBBING = ("stribeck", *(mechanism.name for mechanism in MECHANISMS if "friction" in mechanism.name))
 # what depends on speed, load, acceleration or travel, as every friction law does
 OF_LAW = (
     "time_delay",
     "inertia",
     "backlash",
-    *(each for each in RUBBING if each not in ("edge_friction", "friction_drift")),
+    *(each for each in _RUBBING if each not in ("edge_friction", "friction_drift")),
 )
-COMMON = tuple(candidate.name for candidate in CANDIDATES if candidate.common)
-BY_NAME = {candidate.name: candidate for candidate in CANDIDATES}
+COMMON = tuple(mechanism.name for mechanism in MECHANISMS if mechanism.common)
+CONTACT, UNKNOWN = "contact", "unknown"  # without a term in a model of torques
+ENCODER, ZERO = "encoder_offset", "zero"
+TITLES = {
+    CONTACT: "something touches the finger, or stops it",
+    UNKNOWN: "something that no known effect explains",
+    ENCODER: "the joint's encoder is off",
+    ZERO: "the zero of a tendon's position is off",
+}
+BY_NAME = {mechanism.name: mechanism for mechanism in MECHANISMS}
 
 
-def by_name(name: str) -> Candidate:
-    """Return the candidate of an effect of docs/reference/commands/diagnose.md."""
+def by_name(name: str) -> Mechanism:
+    """Return the mechanism of an effect of docs/reference/commands/diagnose.md."""
     if name not in BY_NAME:
-        raise InputError(f"effect {name!r}: no candidate of this name; expected one of {', '.join(BY_NAME)}")
+        raise InputError(f"effect {name!r}: no mechanism of this name; expected one of {', '.join(BY_NAME)}")
     return BY_NAME[name]
+
+
+def title_of(effect: str) -> str:
+    """Describe an effect of docs/reference/commands/diagnose.md in a few plain words."""
+    return BY_NAME[effect].title if effect in BY_NAME else TITLES.get(effect, effect.replace("_", " "))

@@ -12,7 +12,7 @@ from dataclasses import replace
 from typing import Any
 
 from tendonfmu.arrays import Data
-from tendonfmu.diagnosis.effects.candidate import (
+from tendonfmu.diagnosis.effects.mechanism import (
     ABSENT,
     COVER,
     POINTS,
@@ -91,7 +91,7 @@ def delay(name: str, data: Data, place: Place, shape: Shape) -> Variant:
 
 def changed_law(term: Term) -> str | None:
     """Return the path of the law that a term changes; None if it adds a law or a row."""
-    make, shape = term.candidate.make, term.shape
+    make, shape = term.mechanism.make, term.shape
     if make in (viscous, sides) or (make is stribeck and not shape.get("rises")):
         return law_path(term.place, shape)
     return law_path(term.place, {}) if make is edge and shape else None

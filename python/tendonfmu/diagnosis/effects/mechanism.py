@@ -1,6 +1,6 @@
-"""What a candidate for a cause is: where it can be, which numbers it has, and how it is added to a description.
+"""What a mechanism is: where it can be, which numbers it has, and how it is added to a description.
 
-A candidate holds no formula. It says how to add its term to a finger description at a strength of zero. The columns
+A mechanism holds no formula. It says how to add its term to a finger description at a strength of zero. The columns
 that the diagnosis compares with the residual are the C core's own derivatives by the term's numbers there. If the term
 has no useful derivative at zero, the column is the difference of the core's torque with and without it.
 """
@@ -202,7 +202,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Variant:
-    """A candidate at one place and one point of the grid of its non-linear numbers."""
+    """A mechanism at one place and one point of the grid of its non-linear numbers."""
 
     base: Data  # the description without the term
     shape: Shape  # the non-linear numbers here
@@ -289,7 +289,7 @@ def no_shape(data: Data, place: Place, span: Span) -> list[dict[str, float]]:
 
 
 @dataclass(frozen=True)
-class Candidate:
+class Mechanism:
     """One effect of docs/reference/commands/diagnose.md."""
 
     name: str
@@ -326,9 +326,9 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Term:
-    """A candidate at a place, as it is added to a description."""
+    """A mechanism at a place, as it is added to a description."""
 
-    candidate: Candidate
+    mechanism: Mechanism
     place: Place
     shape: Shape = field(default_factory=dict)  # its non-linear numbers
     magnitudes: Sequence[float] = ()  # one per column, as estimated so far; () for an ordinary size
@@ -336,11 +336,11 @@ class Term:
 
     @property
     def where(self) -> Where:
-        return Where(self.candidate.name, *self.place)
+        return Where(self.mechanism.name, *self.place)
 
     def added_to(self, data: Data) -> dict[str, Any]:
         """Return the description with this term."""
-        return self.candidate.extended(data, self.place, self.shape, self.magnitudes)
+        return self.mechanism.extended(data, self.place, self.shape, self.magnitudes)
 
     def times(self, factors: Sequence[float]) -> Term:
         """Return the term with each magnitude multiplied by its factor."""
