@@ -75,8 +75,8 @@ def _columns(variant: Variant, data: Data, samples: Samples, base: Numbers) -> I
     if variant.late:
         late = samples.of_recordings(data, with_late_forces(samples.recordings, variant.late))
         yield late.left(data) - base
-    elif variant.secant is not None:
-        yield base - samples.left(variant.secant)
+    elif variant.full is not None:
+        yield base - samples.left(variant.full(1.0))
     else:
         for k, size in enumerate(variant.expected):
             magnitudes = [0.0] * variant.count

@@ -191,7 +191,7 @@ class _Changes:
         """Drop the changes that unseen data do not confirm, and return them."""
         search = self._search
         # blocks of tests [B]; without tests, the held-out parts of the new recordings are judged in turn
-        unseen = search.sides.test if self._given.tests else None
+        unseen = search.test if self._given.tests else None
 
         def judge(changes: list[Judged]) -> tuple[list[Judged], list[int]]:
             if len(changes) < len(search.causes):
@@ -281,7 +281,7 @@ class _Changes:
             event_gain=event_gain(models[-1], given.whole, self._changed_events()),
             kind="change",
             load=load,
-            repeated=search.repeated,
+            repeated=len(search.repeats),
         )
 
     def _measured(self, models: Sequence[Data]) -> Gain:
@@ -299,7 +299,7 @@ class _Changes:
         """Return, for each change, what is left without it and with it."""
         search = self._search
         left = search.left()  # with all changes, without the background
-        now, reference = search.informative & search.sides.now, search.informative & ~search.sides.now
+        now, reference = search.informative & search.now, search.informative & ~search.now
         compared = []
         for k, change in enumerate(search.causes):
             added = search.column(k) @ change.magnitudes
@@ -309,7 +309,7 @@ class _Changes:
 
     def _now_series(self) -> Series:
         series = self._search.series
-        return replace(series, used=series.used & self._search.sides.now)
+        return replace(series, used=series.used & self._search.now)
 
     def _views(self) -> tuple[Numbers, Numbers]:
         """Return what the reference model leaves of all recordings, without the changes and with them, N·m [B, n]."""
@@ -322,7 +322,7 @@ class _Changes:
         now = int(judged.sum())
         warnings = []
         # a motion that the reference has exactly is compared with it sample by sample
-        if now < 4 or (folds.folds - now < 4 and not self._search.repeated):
+        if now < 4 or (folds.folds - now < 4 and not self._search.repeats):
             warnings.append(
                 "less than 16 s of the reference or of the new recordings can be compared (free of contact, similar "
                 "loads), so only a large change can be certain; record a minute of the same motion for both"
@@ -361,7 +361,7 @@ class _Changes:
         search = self._search
         loads: list[SteadyLoad] = []
         for means in (False, True) if search.causes else (False,):
-            load = steady_load(search.series, search.torque_left(means), search.sides.now, self._asked.seed)
+            load = steady_load(search.series, search.torque_left(means), search.now, self._asked.seed)
             if load is None:
                 return None
             loads.append(load)
@@ -384,6 +384,6 @@ class _Changes:
                 f"{REPEAT} Then repeat them at half and at twice the pretension: effects that grow with the tendon "
                 "force then differ from those that do not."
             )
-        if not search.repeated and (causes or self._invisible()):
+        if not search.repeats and (causes or self._invisible()):
             return f"{REPEAT} Then their difference shows the change alone."
         return ""

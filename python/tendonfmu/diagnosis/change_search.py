@@ -8,7 +8,7 @@ description has, or a term that it lacks. The error is that on held-out parts of
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -48,14 +48,6 @@ AS_MUCH = 0.98  # of what the best takes off: what is linearised tells no smalle
 STEPS = 3  # of Newton's method, with the derivatives of the reference
 
 
-@dataclass(frozen=True)
-class Sides:
-    """Which blocks belong to which recordings."""
-
-    now: Flags  # blocks of the new recordings [B]
-    test: Flags  # those of them that are not learned from [B]
-
-
 class ChangeSearch(CauseSearch):
     """Adds one change after the other; all of them are free in the new recordings only."""
 
@@ -64,40 +56,38 @@ class ChangeSearch(CauseSearch):
         data: Data,
         samples: Samples,
         least: LeastSizes,
-        now: Sequence[int],
+        new: Sequence[int],
         tests: Sequence[int],
         least_gain: float,
         seed: int,
     ) -> None:
-        """Prepare all columns; `samples` are those of the reference and all new recordings."""
+        """Prepare all columns; `samples` are those of the reference, then of the `new` recordings and the `tests`."""
         super().__init__(MOST_CHANGES)
-        self._least_gain = least_gain
-        self.data, self.samples = data, samples
+        self._least_gain, self.data, self.samples = least_gain, data, samples
         view = self._view = look(data, samples, least)
-        self.series = view.series
-        self.sides = Sides(np.isin(self.series.recording, [*now, *tests]), np.isin(self.series.recording, tests))
-        self._new = {*now, *tests}
-        force, then = (
-            samples.grid.forces(view.predicted.recordings),
-            set(np.unique(self.series.recording).tolist()) - self._new,
-        )
-        self._repeats = find_repeats(self.series, force, sorted(then), sorted(self._new))
+        series = self.series = view.series
+        # blocks of the new recordings, and those of them that are not learned from [B]
+        self.now, self.test = np.isin(series.recording, [*new, *tests]), np.isin(series.recording, tests)
+        self.new_recordings = [int(number) for number in np.unique(series.recording[self.now & ~self.test])]
+        force = samples.grid.forces(view.predicted.recordings)
+        then, now = (np.unique(series.recording[side]).tolist() for side in (~self.now, self.now))
+        self.repeats = find_repeats(series, force, then, now)
         shift = self._level_shift() @ np.linalg.pinv(moment_arms(data))
-        background, scale = background_columns(
-            data, self.series, force - shift, view.columns, samples.residual(data), seed
-        )
+        residual = samples.residual(data)
+        background, scale = background_columns(data, series, force - shift, view.columns, residual, seed)
         shared = np.concatenate([view.nominal, background], axis=2)
-        self._shared = less_reference(shared, self.series, self._repeats)
-        self._target = less_reference(self.series.target, self.series, self._repeats)
+        self._shared = less_reference(shared, series, self.repeats)
+        self._target = less_reference(series.target, series, self.repeats)
         self._scale = np.concatenate([view.scale, scale])
         self.numbers = numbers_of(data)
-        self._values = self._both() * self.sides.now[:, None, None]
-        self._informative = replace(self.series, used=self.series.used & ~outside(self.series, self._repeats))
-        learned = replace(self._informative, used=self._informative.used & ~self.sides.test)
-        self.folds, self.judged = folds_of_sides(learned, self.sides.now)
+        self._values = self._both() * self.now[:, None, None]
+        # without blocks that nothing is learned from
+        self._informative = replace(series, used=series.used & ~outside(series, self.repeats))
+        learned = replace(self._informative, used=self._informative.used & ~self.test)
+        self.folds, self.judged = folds_of_sides(learned, self.now)
         self.candidates = self._candidates()
         self._known: dict[bytes, tuple[Products, Flags]] = {}
-        self.tried = len({cause.where for cause in self.candidates})
+        self.tried = len({candidate.where for candidate in self.candidates})
         self._selection: Selection | None = None
         self._whole = self.error
 
@@ -114,12 +104,10 @@ class ChangeSearch(CauseSearch):
     def _level_shift(self) -> Numbers:
         """Return by how much the mean residual of each recording differs from that of the reference, N·m [B, n]."""
         left, series = self.torque_left(), self.series
-        then = left[series.used & ~self.sides.now].mean(axis=0)
-        shift = np.zeros_like(left)
-        for number in np.unique(series.recording):
+        then, shift = left[series.used & ~self.now].mean(axis=0), np.zeros_like(left)
+        for number in np.unique(series.recording[series.used]):
             rows = series.recording == number
-            own = left[rows & series.used]
-            shift[rows] = own.mean(axis=0) - then if len(own) else 0.0
+            shift[rows] = left[rows & series.used].mean(axis=0) - then
         return shift
 
     # --- rounds ---
@@ -160,23 +148,18 @@ class ChangeSearch(CauseSearch):
             return best
         products, counted = self._products(None)
         chosen = products.chosen(self._together(self.causes), None)
-        u = chosen.nominal_count
         recording = self.series.recording[chosen.folds.rows]
         masks = [(recording == number)[:, None, None] for number in self.new_recordings]
-        parts, places, at = [], [], 0
-        for option in options:
-            column = chosen.table[:, :, u:] @ option.mix.astype(np.float32)
-            own = np.concatenate([column * mask for mask in masks], axis=2)
-            parts.append(own)
-            places.append(slice(at, at + own.shape[2]))
-            at += own.shape[2]
-        every = chosen.with_own(np.concatenate(parts, axis=2))
+        candidates = chosen.table[:, :, chosen.nominal_count :]
+        columns = [candidates @ option.mix.astype(np.float32) for option in options]
+        own = [np.concatenate([column * mask for mask in masks], axis=2) for column in columns]
+        every = chosen.with_own(np.concatenate(own, axis=2))
         grams = Grams(every, self._target_now(), self._scales(self.causes), counted)
-        errors = []
-        for option, place in zip(options, places, strict=True):
-            mix = np.eye(at)[:, place]
-            low, high = (np.tile(end, len(masks)) for end in (option.low, option.high))
-            errors.append(grams.error(mix, low, high)[0])
+        ways = np.split(np.eye(every.count), np.cumsum([part.shape[2] for part in own])[:-1], axis=1)
+        errors = [
+            grams.error(way, *(np.tile(end, len(masks)) for end in (option.low, option.high)))[0]
+            for option, way in zip(options, ways, strict=True)
+        ]
         return options[int(np.argmin(errors))]
 
     def _named(self, cause: Judged) -> tuple[Judged, bool]:
@@ -242,21 +225,13 @@ class ChangeSearch(CauseSearch):
     def selection(self) -> Selection:
         """Everything else that may have changed, given the changes so far."""
         if self._selection is None:
-            self._selection = self._look()
+            known = {change.effect for change in self.causes}
+            left = [candidate for candidate in self.candidates if candidate.effect not in known]
+            products, judged = self._products(None)
+            chosen = products.chosen(self._together(self.causes), None)
+            grams = Grams(chosen, self._target_now(), self._scales(self.causes), judged)
+            self._selection = Selection(grams, left, self._view.least)
         return self._selection
-
-    def _look(self) -> Selection:
-        known = {change.effect for change in self.causes}
-        left = [candidate for candidate in self.candidates if candidate.effect not in known]
-        products, judged = self._products(None)
-        chosen = products.chosen(self._together(self.causes), None)
-        return Selection(Grams(chosen, self._target_now(), self._scales(self.causes), judged), left, self._view.least)
-
-    @property
-    def new_recordings(self) -> list[int]:
-        """Numbers of the new recordings that are learned from."""
-        learned = self.sides.now & ~self.sides.test
-        return [int(number) for number in np.unique(self.series.recording[learned])]
 
     def left(self) -> Numbers:
         """Return what is left with all changes and without what both share, N·m [B, n]; 0 where nothing is used."""
@@ -273,33 +248,23 @@ class ChangeSearch(CauseSearch):
         if without is not None:
             alone = self.causes[without]
             used = np.flatnonzero(alone.mix.any(axis=1))
-            target = target + self._values @ self._mixed(alone)
+            target = target + self._values @ (alone.mix @ alone.magnitudes)
         products, judged = self._products(unseen)
         return Grams(products.chosen(self._together(kept), used), target, self._scales(kept), judged)
 
-    def grams_of_recording(self, number: int, only: int) -> Grams:
-        """Return the products with one change in one new recording as the only candidate."""
-        change = self.causes[number]
-        column = (self._values @ self._mixed(change))[:, :, None]
-        of = {
-            new_recording: column * (self.series.recording == new_recording)[:, None, None]
-            for new_recording in self.new_recordings
-        }
-        kept = [change for k, change in enumerate(self.causes) if k != number]
-        shared = [self._values @ self._together(kept), *(of[recording] for recording in of if recording != only)]
-        nominal = np.concatenate([self._shared, *shared], axis=2)
-        products = Products(self.folds, nominal, of[only], self.samples.splines)
-        scale = np.concatenate([self._scales(kept), np.full(len(of) - 1, np.nan)])
-        return Grams(products, self._target_now() + column[:, :, 0], scale, self.judged)
-
     def shares_by_recording(self, number: int) -> list[tuple[float, float]]:
         """Return (value, standard error) for each new recording: which share of a change is in it, 1 for all of it."""
-        shares = []
-        low, high = _share_bounds(self.causes[number])
-        for recording in self.new_recordings:
-            grams = self.grams_of_recording(number, recording)
-            mix = np.eye(1)
-            share = grams.magnitudes(mix, low, high)
+        change, mix, shares = self.causes[number], np.eye(1), []
+        column = (self._values @ (change.mix @ change.magnitudes))[:, :, None]
+        of = {each: column * (self.series.recording == each)[:, None, None] for each in self.new_recordings}
+        kept = [other for k, other in enumerate(self.causes) if k != number]
+        target, scale = self._target_now() + column[:, :, 0], np.full(len(of) - 1, np.nan)
+        for recording, own in of.items():
+            others = [self._values @ self._together(kept), *(of[other] for other in of if other != recording)]
+            nominal = np.concatenate([self._shared, *others], axis=2)
+            products = Products(self.folds, nominal, own, self.samples.splines)
+            grams = Grams(products, target, np.concatenate([self._scales(kept), scale]), self.judged)
+            share = grams.magnitudes(mix, *_share_bounds(change))
             _, covariance = self.certainty_of(grams, mix)
             shares.append((float(share[0]), float(np.sqrt(max(covariance[0, 0], 0.0)))))
         return shares
@@ -332,12 +297,8 @@ class ChangeSearch(CauseSearch):
     def added(self, changes: Sequence[Judged]) -> Numbers:
         """Return what changes add to the numbers that the description has [u]."""
         first = self._view.columns.values.shape[2]
-        parts = [np.zeros(len(self.numbers)), *(self._mixed(change)[first:] for change in changes)]
+        parts = [np.zeros(len(self.numbers)), *((change.mix @ change.magnitudes)[first:] for change in changes)]
         return np.asarray(np.sum(parts, axis=0))
-
-    @staticmethod
-    def _mixed(change: Judged) -> Numbers:
-        return np.asarray(change.mix @ change.magnitudes)
 
     def now_data(self, changes: Sequence[Judged] | None = None) -> dict[str, Any]:
         """Return the description of now, derived from that of the reference."""
@@ -347,17 +308,12 @@ class ChangeSearch(CauseSearch):
     def moved(self) -> Numbers:
         """Return what the changes add to the model's torque, N·m [B, n]; 0 in the reference."""
         moved = self.samples.left(self.data) - self.samples.left(self.now_data())
-        return np.where(self.sides.now[:, None], moved, 0.0)
+        return np.where(self.now[:, None], moved, 0.0)
 
     @property
     def informative(self) -> Flags:
         """Blocks that something is learned from [B]."""
         return self._informative.used
-
-    @property
-    def repeated(self) -> int:
-        """Number of new recordings that repeat a motion of the reference exactly."""
-        return len(self._repeats)
 
     def torque_left(self, means: bool = False) -> Numbers:
         """Return measured less modelled torque, including the bias but without its own jumps, N·m [B, n]."""
@@ -366,8 +322,8 @@ class ChangeSearch(CauseSearch):
         left = self.samples.grid.means(whole)
         if self.causes:
             moved = self.moved()
-            mean = 0.0 if means else moved[self.series.used & self.sides.now].mean(axis=0)
-            left -= np.where(self.sides.now[:, None], moved - mean, 0.0)
+            mean = 0.0 if means else moved[self.series.used & self.now].mean(axis=0)
+            left -= np.where(self.now[:, None], moved - mean, 0.0)
         return np.asarray(left)
 
     @property

@@ -236,19 +236,13 @@ def structure_of(data: Data) -> Structure:
     return _with_scale(build_structure(finger_from_data(data, Path("finger")), Choice()), data)
 
 
-def key_of(data: Data, name: str) -> str:
-    """Return a name of an unknown that another description has, too: rows of `extensions` by effect and place."""
-    if not name.startswith("extensions["):
-        return name
-    head, _, last = name.partition(".")
-    number = int(head[len("extensions[") : -1]) - 1
-    rows = data["extensions"]
-
-    def mark(row: Mapping[str, Any]) -> tuple[Any, ...]:
-        return tuple(row.get(key) for key in ("effect", "joint", "tendon", "level"))
-
-    same = sum(mark(row) == mark(rows[number]) for row in rows[:number])
-    return f"{mark(rows[number])} {same}.{last}"
+def key_of(data: Data, path: str) -> Any:
+    """Return what names a number in other descriptions, too: rows of `extensions` by effect and place, as they move."""
+    place = re.match(r"extensions\[(\d+)\]", path)
+    if place is None:
+        return path
+    *before, own = (tuple(row.get(key) for key in PLACE) for row in extension_rows(data)[: int(place[1])])
+    return own, before.count(own), path[place.end() :]
 
 
 def with_known(data: Mapping[str, Any], recordings: Sequence[FitRecording], settings: FitSettings) -> Mapping[str, Any]:
@@ -303,7 +297,12 @@ def cause_parameters(
 ) -> tuple[Mapping[str, tuple[float, str]], ...]:
     """Return the numbers of each cause in a model that was fitted with all of them: path -> (value, unit)."""
     units = {parameter.path: parameter.unit for parameter in native.Instance.from_description(model.data).parameters()}
-    return tuple(_parameters(model, own, units) for own in added_paths(nominal, causes))
+    # those that were estimated, and all numbers of extensions
+    known = {*model.values, *(path for path in units if path.startswith("extensions["))}
+    return tuple(
+        {path: (float(get_number(model.data, path)), units[path]) for path in paths if path in known}
+        for paths in added_paths(nominal, causes)
+    )
 
 
 def extended_description(data: Mapping[str, Any], causes: Sequence[Term]) -> Mapping[str, Any]:
@@ -315,32 +314,18 @@ def extended_description(data: Mapping[str, Any], causes: Sequence[Term]) -> Map
 
 def added_paths(data: Mapping[str, Any], causes: Sequence[Term]) -> tuple[tuple[str, ...], ...]:
     """Return, for each cause, the paths of the numbers that it adds or replaces, in the description with all causes."""
-    added, before = [], _numbers_by_row(data)
+    added, before = [], _numbers_by_key(data)
     for cause in causes:
         data = cause.added_to(data)
-        after = _numbers_by_row(data)
+        after = _numbers_by_key(data)
         # a number that is only written differently does not belong to the cause
-        added.append([row for row, (_, value) in after.items() if row not in before or before[row][1] != value])
+        added.append([key for key, (_, value) in after.items() if key not in before or before[key][1] != value])
         before = after
-    return tuple(tuple(before[row][0] for row in rows if row in before) for rows in added)
+    return tuple(tuple(before[key][0] for key in keys if key in before) for keys in added)
 
 
-def _numbers_by_row(data: Data) -> dict[Any, tuple[str, float]]:
-    """Return (path, value) of all numbers; those of extensions by effect and place, since rows move."""
-    rows = [tuple(row.get(key) for key in PLACE) for row in extension_rows(data)]
-    found: dict[Any, tuple[str, float]] = {}
-    for path, value in _leaves(data):
-        place = re.match(r"extensions\[(\d+)\]", path)
-        k = 0 if place is None else int(place[1])
-        key: Any = (rows[k - 1], rows[: k - 1].count(rows[k - 1]), path[place.end() :]) if place else path
-        found[key] = (path, value)
-    return found
-
-
-def _parameters(model: FittedModel, paths: Sequence[str], units: Mapping[str, str]) -> dict[str, tuple[float, str]]:
-    """Return those of the paths that were estimated, and all numbers of extensions."""
-    own = (path for path in paths if path in model.values or (path in units and path.startswith("extensions[")))
-    return {path: (float(get_number(model.data, path)), units[path]) for path in own}
+def _numbers_by_key(data: Data) -> dict[Any, tuple[str, float]]:
+    return {key_of(data, path): (path, value) for path, value in _leaves(data)}
 
 
 # --- parts ------------------------------------------------------------------------------------------------------------

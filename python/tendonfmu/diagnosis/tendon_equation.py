@@ -39,15 +39,11 @@ class Off:
     @property
     def size(self) -> ChangedSize:
         """How large it was, or is described, and is now."""
-        low, high = (self.number.value + side * self.number.half for side in (-1.0, 1.0))
-        then, off = self.number.described, self.number.off
-        return ChangedSize(
-            "offset" if self.where.effect == ENCODER else self.number.path.rsplit(".", 1)[-1].split("[")[0],
-            self.unit,
-            Interval(then, then, then),
-            Interval(self.number.value, low, high),
-            Interval(off, low - then, high - then),
-        )
+        then, number = self.number.described, self.number
+        name = "offset" if self.where.effect == ENCODER else number.path.rsplit(".", 1)[-1].split("[")[0]
+        now = Interval(number.value, number.value - number.half, number.value + number.half)
+        change = Interval(number.off, now.low - then, now.high - then)
+        return ChangedSize(name, self.unit, Interval(then, then, then), now, change)
 
 
 @dataclass(frozen=True)
