@@ -26,7 +26,7 @@ def test_each_further_name_needs_more() -> None:
 
 
 def in_nominal(data: Any, effect: Term) -> bool:
-    made = whole._Result.__new__(whole._Result)
+    made = whole.Lacks.__new__(whole.Lacks)
     samples = SimpleNamespace(recordings=[SimpleNamespace(kinematics=1)])
     base = SimpleNamespace(nominal=SimpleNamespace(data=data), samples=samples)
     made._searched = cast("Any", SimpleNamespace(base=base))

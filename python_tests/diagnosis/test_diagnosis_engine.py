@@ -259,9 +259,9 @@ def test_a_hidden_spring_is_found_and_fitted(hidden: FitRecording) -> None:
     assert Where("cover_stiffness", 2) in [first.where, *(each.where for each in first.alike)]
     assert len(found.causes) <= 2
     if first.effect == "cover_stiffness":
-        assert found.extended.data["joints"][1]["cover"]["stiffness"] == pytest.approx(0.02, rel=0.2)
-    used = found.last.series.used
-    assert np.mean(found.last.residual[used] ** 2) < np.mean(found.first.residual[used] ** 2)
+        assert found.model.data["joints"][1]["cover"]["stiffness"] == pytest.approx(0.02, rel=0.2)
+    used = found.view.series.used
+    assert np.mean(found.view.residual[used] ** 2) < np.mean(found.first.residual[used] ** 2)
     assert "causes" in seen and "contact" in seen
 
 

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from tendonfmu.diagnosis.effects import MECHANISMS, Place, Term
-from tendonfmu.diagnosis.experiments.menu import (
+from tendonfmu.diagnosis.extension_fit import FitSettings, extended_description, fit_numbers
+from tendonfmu.diagnosis.menu import (
     WIDER,
     Entry,
     Recorded,
@@ -22,9 +23,8 @@ from tendonfmu.diagnosis.experiments.menu import (
     motions,
     tensions,
 )
-from tendonfmu.diagnosis.experiments.motion import discriminating_motion, expected_recording, perform
-from tendonfmu.diagnosis.experiments.next_experiment import Experiments, Question, plan_experiments
-from tendonfmu.diagnosis.extension_fit import FitSettings, extended_description, fit_numbers
+from tendonfmu.diagnosis.motion import discriminating_motion, expected_recording, perform
+from tendonfmu.diagnosis.next_experiment import Experiments, Question, plan_experiments
 from tendonfmu.diagnosis.samples import Samples, exact_model
 from tendonfmu.errors import InputError
 from tendonfmu.files.json_node import Node

@@ -21,10 +21,10 @@ if TYPE_CHECKING:
     from .effects.places import thresholds
     from .effects.table import CONTACT, UNKNOWN, ZERO, title_of
     from .effects.words import NBSP, quantity
-    from .experiments.motion import discriminating_motion
     from .extension_fit import FitSettings, with_known
     from .history import History, Line, diagnose_history, share_of
-    from .names import Names, at_place, names_in, numbered, reported_causes
+    from .motion import discriminating_motion
+    from .names import Names, at_place, names_in, numbered, reported_causes, size_at
     from .result import (
         Cause,
         CausePlace,
@@ -39,6 +39,5 @@ if TYPE_CHECKING:
         Sensor,
     )
     from .samples import Samples
-    from .sizes import size_at
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -27,7 +27,7 @@ from tendonfmu.diagnosis.extension_fit import (
     memory_terms,
 )
 from tendonfmu.diagnosis.samples import Samples, shifted
-from tendonfmu.diagnosis.selection import LeastSizes, Selection, least_sizes
+from tendonfmu.diagnosis.selection import Judged, LeastSizes, least_sizes
 from tendonfmu.diagnosis.view import View, look
 from tendonfmu.estimate import choose_memory
 from tendonfmu.model import EFFECT_NUMBERS, Finger, moment_arms
@@ -96,14 +96,8 @@ def _digest(given: Finger, recordings: Sequence[FitRecording], settings: FitSett
     known = hashlib.sha256(json.dumps([given.data, str(settings), least_gain]).encode())
     for recording in recordings:
         known.update(f"{recording.kinematics} {recording.parts}".encode())
-        groups = recording.recording.groups
-        for values in (
-            recording.time,
-            recording.target,
-            recording.train,
-            recording.at_rest,
-            *(groups[name] for name in sorted(groups)),
-        ):
+        groups = [values for _, values in sorted(recording.recording.groups.items())]
+        for values in (recording.time, recording.target, recording.train, recording.at_rest, *groups):
             known.update(values.tobytes())
     return known.hexdigest()
 
@@ -131,12 +125,8 @@ def _found_base(given: Finger, recordings: Sequence[FitRecording], settings: Fit
 def _position_dependent(data: Data, samples: Samples, least: LeastSizes, least_gain: float) -> list[tuple[Term, ...]]:
     """Return the terms of effects that depend on angles alone, one effect after the other."""
     view = look(data, samples, least, [by_name(name) for name in POSITION])
-    taken: list[Any] = []
-    while len(taken) < len(POSITION):
-        selection: Selection = view.beside({cause.where for cause in taken})
-        best = selection.best(least_gain)
-        if best is None:
-            break
+    taken: list[Judged] = []
+    while best := view.beside({cause.where for cause in taken}).best(least_gain):
         taken.append(best)
     return [cause.scaled() for cause in taken]
 

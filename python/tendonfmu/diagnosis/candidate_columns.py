@@ -20,7 +20,7 @@ from tendonfmu.diagnosis.effects import MECHANISMS, SHARED, Mechanism, Place, Te
 from tendonfmu.diagnosis.extension_fit import structure_of
 from tendonfmu.diagnosis.samples import Samples, Span, span_of, with_late_forces
 from tendonfmu.errors import TooLargeError
-from tendonfmu.estimate import SCALING, Estimator, Unknown, own_copy, set_number
+from tendonfmu.estimate import SCALING, Estimator, own_copy, set_number
 from tendonfmu.model import law_path, native, steps_of
 
 Single = NDArray[np.float32]
@@ -61,7 +61,12 @@ def candidate_columns(
     proposals = tuple(_proposed(data, samples.recordings[0].kinematics, span, mechanisms, worth))
     count = proposals[-1].columns.stop if proposals else 0
     joints, blocks = len(data["joints"]), samples.grid.blocks
-    _refuse_too_many(blocks * joints * count * 4 / 1e9, count)
+    size = blocks * joints * count * 4 / 1e9
+    if size > _MOST_MEMORY:
+        raise TooLargeError(
+            f"{count} columns of candidate causes need {size:.0f} GB; expected at most {_MOST_MEMORY:g} GB: use "
+            "a finger of fewer joints and tendons at a time, or shorter recordings"
+        )
     values = np.zeros((blocks, joints, count), dtype=np.float32)
     base = samples.left(data)
     for proposal in proposals:
@@ -84,14 +89,6 @@ def _columns(variant: Variant, data: Data, samples: Samples, base: Numbers) -> I
             yield (base - samples.left(variant.at(magnitudes))) / size
 
 
-def _refuse_too_many(size: float, columns: int) -> None:
-    if size > _MOST_MEMORY:
-        raise TooLargeError(
-            f"{columns} columns of candidate causes need {size:.0f} GB; expected at most {_MOST_MEMORY:g} GB: use "
-            "a finger of fewer joints and tendons at a time, or shorter recordings"
-        )
-
-
 def _proposed(
     data: Data, kinematics: int, span: Span, mechanisms: Sequence[Mechanism], worth: Worth | None
 ) -> Iterator[Proposal]:
@@ -99,14 +96,11 @@ def _proposed(
     for mechanism in mechanisms:
         for place in mechanism.places(data, kinematics):
             for variant in mechanism.variants(data, place, span):
-                if _is_sane(variant) and (worth is None or worth(mechanism, place, variant.shape)):
+                # recordings of another scale can lead to any value; a description accepts none that is larger
+                is_sane = all(abs(value) <= _LARGEST for value in variant.shape.values())
+                if is_sane and (worth is None or worth(mechanism, place, variant.shape)):
                     yield Proposal(mechanism, place, variant, slice(first, first + variant.count))
                     first += variant.count
-
-
-def _is_sane(variant: Variant) -> bool:
-    """Return whether a description accepts the variant's numbers; recordings of another scale can lead to any value."""
-    return all(abs(value) <= _LARGEST for value in variant.shape.values())
 
 
 # --- from coarse to fine ----------------------------------------------------------------------------------------------
@@ -257,7 +251,10 @@ class Number:
 def numbers_of(data: Data) -> list[Number]:
     """Return the numbers in the order of `extension_fit.number_columns`."""
     unknowns = [unknown for unknown in estimator_of(data)[0].unknowns if not unknown.path.startswith("bias.")]
-    return [_number(data, k, unknown) for k, unknown in enumerate(unknowns)]
+    return [
+        Number(*_owner(data, unknown.path), k, unknown.path, unknown.start, unknown.lower, unknown.upper)
+        for k, unknown in enumerate(unknowns)
+    ]
 
 
 def estimator_of(data: Data) -> tuple[Estimator, list[str]]:
@@ -265,11 +262,6 @@ def estimator_of(data: Data) -> tuple[Estimator, list[str]]:
     structure = structure_of(data)
     paths = [parameter.path for parameter in native.Instance(structure.start.image).parameters()]
     return Estimator(structure.start.image, structure.group, structure.scale), paths
-
-
-def _number(data: Data, index: int, unknown: Unknown) -> Number:
-    effect, place, side = _owner(data, unknown.path)
-    return Number(effect, place, side, index, unknown.path, unknown.start, unknown.lower, unknown.upper)
 
 
 def _owner(data: Data, path: str) -> tuple[str, Place, int]:

@@ -327,14 +327,15 @@ def detection_gain(nominal: Data, extended: Data, recordings: Sequence[FitRecord
     except InputError:  # nothing can be tuned, for example with a bias without drift
         return None
     before, after = (_score(tuning.description_.data, labelled, kinematics) for tuning in tuned)
+    delays = [float(np.median(score.delays)) if len(score.delays) else None for score in (before, after)]
     return DetectionGain(
         events=len(before.events),
         found_before=before.found,
         found_after=after.found,
         false_alarms_before=len(before.false_alarms),
         false_alarms_after=len(after.false_alarms),
-        median_delay_before=_median(before),
-        median_delay_after=_median(after),
+        median_delay_before=delays[0],
+        median_delay_after=delays[1],
         smallest_push_before=tuple(map(float, tuned[0].push_)),
         smallest_push_after=tuple(map(float, tuned[1].push_)),
     )
@@ -387,7 +388,3 @@ def _tuned(data: Data, free: Sequence[Recording], kinematics: int, rate: float) 
 def _score(data: Data, recordings: Sequence[Recording], kinematics: int) -> DetectionScore:
     subject = Subject(Path("finger"), finger_from_data(data), packed=False)
     return pooled([run_track(subject, recording, kinematics, None).score() for recording in recordings])
-
-
-def _median(score: DetectionScore) -> float | None:
-    return float(np.median(score.delays)) if len(score.delays) else None

@@ -15,7 +15,6 @@ from tendonfmu.diagnosis.base import Base, refitted
 from tendonfmu.diagnosis.contact_scan import detection_gain, event_gain, events_of, without_events
 from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION, COMMON, OF_LAW, Term, Where
 from tendonfmu.diagnosis.effects.places import law_of, thresholds
-from tendonfmu.diagnosis.experiments.next_experiment import Experiments, Question, plan_experiments
 from tendonfmu.diagnosis.extension_fit import (
     PRESLIDING,
     FittedModel,
@@ -25,12 +24,13 @@ from tendonfmu.diagnosis.extension_fit import (
     with_known,
 )
 from tendonfmu.diagnosis.gain import Gain, Unseen, measure_gain
+from tendonfmu.diagnosis.names import size_of
+from tendonfmu.diagnosis.next_experiment import Experiments, Question, plan_experiments
 from tendonfmu.diagnosis.remainder import measure_remainder, remainder_map, unexplained_of
 from tendonfmu.diagnosis.result import Cause, CausePlace, Diagnosis, Event, Invisible, Unexplained, by_gain
 from tendonfmu.diagnosis.samples import Samples, Span, as_described, span_of
-from tendonfmu.diagnosis.search import Search, calibrated, search, terms_of
+from tendonfmu.diagnosis.search import ExtensionSearch, calibrated, search, terms_of
 from tendonfmu.diagnosis.selection import SIGNIFICANCE, Judged, confirmed, invisible_effects, names_needed, step_p_value
-from tendonfmu.diagnosis.sizes import size_of
 from tendonfmu.estimate import SCALING
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import Interval
@@ -56,46 +56,6 @@ class Verified:
     gain: Gain
     nominal_data: Data  # descriptions as they run online
     extended_data: Data
-
-
-def verify(
-    result: Search, training: Sequence[FitRecording], tests: Sequence[FitRecording], least_gain: float, seed: int
-) -> Verified:
-    """Measure the gain of each cause on unseen data and drop the weak ones."""
-    bench = _Bench(result, training, tests, seed)
-
-    def judge(causes: list[Judged]) -> tuple[list[Judged], list[int]]:
-        fit, without = bench.fit(causes), bench.each_without(causes)
-        judged = [bench.with_gain(cause, model, fit) for cause, model in zip(causes, without, strict=True)]
-        needed, shares = names_needed(judged), bench.shares_of_memory(causes, fit, without)
-        weak = [
-            k
-            for k, cause in enumerate(judged)
-            if not (
-                cause.gain.low > 0.0
-                and cause.gain.value >= least_gain * needed[k]
-                and (shares[k] >= FORM or cause.effect not in LIKE_A_LAW)
-                and result.base.least.shows_all(cause.effect, cause.terms, fit.data)
-            )
-        ]
-        return judged, weak
-
-    causes, dropped = confirmed(merged(result.causes), judge)
-    fit, nominal = bench.fit(causes), bench.written(bench.nominal)
-    places, intervals = bench.numbers(fit, causes)
-    ranked = by_gain(causes)
-    between = [bench.fit(ranked[: k + 1]).data for k in range(len(ranked) - 1)]
-    extended, threads = bench.written(fit) if causes else nominal, result.base.settings.threads
-    return Verified(
-        causes=tuple(ranked),
-        places=tuple(tuple(places[id(term)] for term in cause.terms) for cause in ranked),
-        intervals=intervals,
-        without=tuple(bench.each_without(ranked)),
-        dropped=tuple(dropped),
-        gain=measure_gain(nominal, extended, training, tests, between=between, seed=seed, threads=threads),
-        nominal_data=nominal,
-        extended_data=extended,
-    )
 
 
 def merged(causes: Sequence[Judged]) -> list[Judged]:
@@ -131,22 +91,58 @@ class _Bench:
     """Fits of any set of causes, and what they leave of unseen data."""
 
     def __init__(
-        self, result: Search, training: Sequence[FitRecording], tests: Sequence[FitRecording], seed: int
+        self, found: ExtensionSearch, training: Sequence[FitRecording], tests: Sequence[FitRecording], seed: int
     ) -> None:
-        base = result.base
-        self._result, self._settings, self._seed = result, base.settings, seed
-        self._full, self.nominal, self._samples = result.extended, base.nominal, base.samples
+        base = found.base
+        self._found, self._settings, self._seed, self._data = found, base.settings, seed, (training, tests)
+        self._full, self.nominal, self._samples = found.model, base.nominal, base.samples
         if not tests:  # exclude the judged samples from the fits
             self._samples = Samples.of(self.nominal.data, training, self._settings.threads)
             self._samples = replace(self._samples, drift=self._samples.as_rests_demand(self.nominal.data).drift)
             self._full, self.nominal = (
                 refitted(model, self._samples, self._settings) for model in (self._full, self.nominal)
             )
-        self._training = training
         self._unseen = Unseen(self.nominal.data, training, tests, self._settings.threads)
         self._predicted = self._samples.at_predicted_forces(self._full.data)
-        self._fits: dict[frozenset[int], FittedModel] = {frozenset(map(id, terms_of(result.causes))): self._full}
-        self._order: dict[frozenset[int], list[Term]] = {next(iter(self._fits)): terms_of(result.causes)}
+        self._fits: dict[frozenset[int], FittedModel] = {frozenset(map(id, terms_of(found.causes))): self._full}
+        self._order: dict[frozenset[int], list[Term]] = {next(iter(self._fits)): terms_of(found.causes)}
+
+    def verified(self, least_gain: float) -> Verified:
+        """Measure the gain of each cause on unseen data and drop the weak ones."""
+
+        def judge(causes: list[Judged]) -> tuple[list[Judged], list[int]]:
+            fit, without = self.fit(causes), self.each_without(causes)
+            judged = [self.with_gain(cause, model, fit) for cause, model in zip(causes, without, strict=True)]
+            needed, shares = names_needed(judged), self.shares_of_memory(causes, fit, without)
+            weak = [
+                k
+                for k, cause in enumerate(judged)
+                if not (
+                    cause.gain.low > 0.0
+                    and cause.gain.value >= least_gain * needed[k]
+                    and (shares[k] >= FORM or cause.effect not in LIKE_A_LAW)
+                    and self._found.base.least.shows_all(cause.effect, cause.terms, fit.data)
+                )
+            ]
+            return judged, weak
+
+        causes, dropped = confirmed(merged(self._found.causes), judge)
+        ranked, fit, nominal = by_gain(causes), self.fit(causes), self.written(self.nominal)
+        places, intervals = self.numbers(fit, causes)
+        between = [self.fit(ranked[: k + 1]).data for k in range(len(ranked) - 1)]
+        extended = self.written(fit) if causes else nominal
+        return Verified(
+            causes=tuple(ranked),
+            places=tuple(tuple(places[id(term)] for term in cause.terms) for cause in ranked),
+            intervals=intervals,
+            without=tuple(self.each_without(ranked)),
+            dropped=tuple(dropped),
+            gain=measure_gain(
+                nominal, extended, *self._data, between=between, seed=self._seed, threads=self._settings.threads
+            ),
+            nominal_data=nominal,
+            extended_data=extended,
+        )
 
     def fit(self, causes: Sequence[Judged]) -> FittedModel:
         """Return the fit with some of the causes; it starts at that with all of them."""
@@ -191,24 +187,19 @@ class _Bench:
 
     def written(self, model: FittedModel) -> Data:
         """Return a description with what is known of its numbers."""
-        return with_known(model.data, self._training, self._settings)
+        return with_known(model.data, self._data[0], self._settings)
 
 
 MOST_RIVALS = 3  # rivals of a cause for which an experiment is planned
 
 
-def diagnose_extension(asked: Asked, base: Base) -> Diagnosis:
-    """Find what the description lacks."""
-    searched = search(base, least_gain=asked.least_gain, seed=asked.seed, phases=asked.phases)
-    return _Result(asked, searched).diagnosis()
+class Lacks:
+    """What the description lacks, and everything that is reported of it."""
 
-
-class _Result:
-    """Everything that is reported of a search."""
-
-    def __init__(self, asked: Asked, searched: Search) -> None:
-        self._asked, self._given, self._searched = asked, asked.given, searched
-        self._series = searched.last.series
+    def __init__(self, asked: Asked, base: Base) -> None:
+        self._asked, self._given = asked, asked.given
+        self._searched = search(base, least_gain=asked.least_gain, seed=asked.seed, phases=asked.phases)
+        self._series = self._searched.view.series
 
     def diagnosis(self) -> Diagnosis:
         """Return the diagnosis; its duration is still 0."""
@@ -249,13 +240,13 @@ class _Result:
             detection=detection_gain(verified.nominal_data, verified.extended_data, everything) if named else None,
             nominal_data=verified.nominal_data,
             extended_data=verified.extended_data,
-            tested=len({candidate.where for candidate in searched.last.selection.candidates}),
+            tested=len({candidate.where for candidate in searched.view.selection.candidates}),
             event_gain=event_gain(verified.extended_data, given.whole, searched.events),
         )
 
     def _warnings(self) -> list[str]:
         folds = self._searched.first.folds
-        warnings = list(self._searched.extended.warnings)
+        warnings = list(self._searched.model.warnings)
         if not folds.enough:
             warnings.append("less than 8 s of motion: too short to name a cause; record a minute or more")
         elif folds.folds < 8:
@@ -272,10 +263,10 @@ class _Result:
         tests = [without_events(recording, events) for recording, events in zip(given.tests, unseen, strict=True)]
         self._events = (*searched.events, *(event for events in unseen for event in events))
         training = [without_events(recording, searched.events) for recording in given.training]
-        return verify(searched, training, tests, asked.least_gain, asked.seed)
+        return _Bench(searched, training, tests, asked.seed).verified(asked.least_gain)
 
     def _events_in(self, recording: FitRecording) -> Sequence[Event]:
-        data = self._searched.extended.data
+        data = self._searched.model.data
         return events_of(data, Samples.of(data, [recording], self._asked.settings.threads), self._asked.seed)[0]
 
     # --- causes ---
@@ -295,7 +286,7 @@ class _Result:
     # --- what is left, and what to do next ---
 
     def _unexplained(self, left: Numbers) -> Unexplained:
-        view, samples, used = self._searched.last, self._searched.base.samples, self._series.used
+        view, samples, used = self._searched.view, self._searched.base.samples, self._series.used
         measured = samples.grid.means([recording.target for recording in samples.recordings])
         # the residual itself must be in neither
         force, torque = samples.grid.forces(view.predicted.recordings), measured - left
@@ -311,40 +302,41 @@ class _Result:
 
     def _experiments(self, verified: Verified) -> tuple[Experiments, dict[Where, str], tuple[Invisible, ...]]:
         """Plan experiments for causes that cannot be distinguished or are uncertain, and for effects not visible."""
-        rivals = [
-            Question(cause.terms[0], rival)
+        found = self._searched
+        pairs = [
+            (cause.terms[0], other.terms[0].ordinary)
             for cause in verified.causes
-            for rival in [other.terms[0].ordinary for other in cause.alike[:MOST_RIVALS] if other.effect != CALIBRATION]
-            if all(self._is_in_nominal(term) for term in (cause.terms[0], rival))
+            for other in [rival for rival in cause.alike[:MOST_RIVALS] if rival.effect != CALIBRATION]
         ]
-        known = {term.where for term in terms_of([*verified.causes, *verified.dropped, *self._searched.small])}
-        unseen = invisible_effects(self._searched.last.selection, verified.causes, known, self._asked.least_gain)
+        rivals = [Question(*pair) for pair in pairs if all(self._is_in_nominal(term) for term in pair)]
+        known = {term.where for term in terms_of([*verified.causes, *verified.dropped, *found.small])}
+        unseen = invisible_effects(found.view.selection, verified.causes, known, self._asked.least_gain)
         nearest: dict[str, Question] = {}
-        for cause, hidden in unseen:
-            if self._is_in_nominal(cause.terms[0]):
-                nearest.setdefault(cause.effect, Question(cause.terms[0].ordinary, absorbed=hidden.absorbed))
+        for candidate, hidden in unseen:
+            if self._is_in_nominal(candidate.terms[0]):
+                nearest.setdefault(candidate.effect, Question(candidate.terms[0].ordinary, absorbed=hidden.absorbed))
         dropped = [cause for cause in verified.dropped if cause.terms and self._is_in_nominal(cause.terms[0])]
-        questions = [*rivals, *nearest.values()]
-        first = len(questions)
-        questions += [Question(cause.terms[0]) for cause in dropped]
-        noise = self._left(self._searched.extended.data)[self._series.used].std(axis=0)
+        questions = [*rivals, *nearest.values(), *(Question(cause.terms[0]) for cause in dropped)]
+        noise = self._left(found.model.data)[self._series.used].std(axis=0)
         with self._asked.phases.start("next experiment", len(questions) or None) as step:
             planned = plan_experiments(
-                self._searched.base.nominal.data,  # without the causes in question
-                self._searched.base.samples.recordings,
+                found.base.nominal.data,  # without the causes in question
+                found.base.samples.recordings,
                 questions,
                 noise=[float(value) for value in noise],
                 seed=self._asked.seed,
                 progress=lambda done, total: step(done),
             )
-        number_of = {effect: len(rivals) + k for k, effect in enumerate(nearest)}
-        shown = []
-        for cause, hidden in unseen:
-            number = number_of.get(cause.effect)
-            if number is not None:
-                hidden = replace(hidden, experiment=planned.sentence(number), motion=planned.motion(number))
-            shown.append(hidden)
-        settling = {cause.where: planned.sentence(first + k) for k, cause in enumerate(dropped)}
+        number_of = {effect: number for number, effect in enumerate(nearest, start=len(rivals))}
+        shown = [
+            replace(hidden, experiment=planned.sentence(number), motion=planned.motion(number))
+            if (number := number_of.get(hidden.where.effect)) is not None
+            else hidden
+            for _, hidden in unseen
+        ]
+        settling = {
+            cause.where: planned.sentence(k) for k, cause in enumerate(dropped, start=len(rivals) + len(nearest))
+        }
         return planned, settling, tuple(shown)
 
     @cached_property

@@ -27,7 +27,7 @@ import numpy as np
 from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.answer import Asked
 from tendonfmu.diagnosis.base import find_base
-from tendonfmu.diagnosis.change_diagnosis import sizes_now
+from tendonfmu.diagnosis.change_diagnosis import Changes
 from tendonfmu.diagnosis.diagnosis import LEAST_GAIN, diagnose
 from tendonfmu.diagnosis.effects import Where
 from tendonfmu.diagnosis.extension_fit import FitSettings
@@ -197,7 +197,7 @@ def sizes_in(
     settings = FitSettings(threads=1, path=given.finger.path)
     asked = Asked(given, 0.0, seed, settings, Phases({}))
     base = find_base(given.finger, given.reference, settings, least_gain)
-    sizes = sizes_now(asked, base, [key for key in named if key not in kinematic.known])
+    sizes = Changes(asked, base).sizes([key for key in named if key not in kinematic.known])
     sizes += [(key, kinematic.known[key].size) for key in named if key in kinematic.known]
     listed = [{"where": astuple(where), **asdict(replace(size, by=()))} for where, size in sizes]
     return {"recording": recording, "sizes": json.dumps(listed)}  # intervals may be infinite

@@ -13,12 +13,11 @@ measured forces less the unexplained torque, which is spread over the tendons as
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tendonfmu.arrays import Array, Data, Flags, Numbers
 from tendonfmu.estimate import CoreRuns, SlowDrift, slowest_drift
@@ -306,35 +305,21 @@ def span_of(data: Mapping[str, Any], recordings: Sequence[FitRecording]) -> Span
     arms = moment_arms(data)
     every = max(1, sum(len(recording.time) for recording in recordings) // _LOOKED_AT)
     rows = [np.flatnonzero(recording.train)[::every] for recording in recordings]
-    angle, speed, force, torque = (
-        np.concatenate(signals)
-        for signals in zip(
-            *(_signals(recording, row) for recording, row in zip(recordings, rows, strict=True)), strict=True
-        )
-    )
+
+    def of(signals: Iterable[Numbers]) -> Numbers:
+        return np.concatenate([values[own] for values, own in zip(signals, rows, strict=True)])
+
+    angle, speed = (of(getattr(each.model, name) for each in recordings) for name in ("joint_angle", "joint_speed"))
+    force, ends = of(each.recording.groups["tendon_force"] for each in recordings), [_OUTER, 1 - _OUTER]
     sliding = np.cumsum((speed[:, None, :] * arms)[:, :, ::-1], axis=2)[:, :, ::-1]
     steps = np.concatenate([np.diff(recording.time[part]) for recording in recordings for part in recording.parts])
     return Span(
-        angle=_range(angle),
+        angle=np.quantile(angle, ends, axis=0).T,
         speed=np.quantile(np.abs(speed), _FAST, axis=0),
         tendon_speed=np.quantile(np.abs(sliding), _FAST, axis=0),
-        position=_range(angle @ arms.T),
-        force=_range(force),
-        torque=np.std(torque, axis=0),
-        duration=max(
-            float(recording.time[part][-1] - recording.time[part][0])
-            for recording in recordings
-            for part in recording.parts
-        ),
+        position=np.quantile(angle @ arms.T, ends, axis=0).T,
+        force=np.quantile(force, ends, axis=0).T,
+        torque=np.std(of(recording.target for recording in recordings), axis=0),
+        duration=max(float(one.time[part][-1] - one.time[part][0]) for one in recordings for part in one.parts),
         step=float(np.median(steps)),
     )
-
-
-def _signals(recording: FitRecording, rows: NDArray[np.intp]) -> tuple[Numbers, ...]:
-    model, force = recording.model, recording.recording.groups["tendon_force"]
-    return tuple(values[rows] for values in (model.joint_angle, model.joint_speed, force, recording.target))
-
-
-def _range(values: Numbers) -> Numbers:
-    """Return 1 % and 99 % quantiles [k, 2] of values [N, k]."""
-    return np.asarray(np.quantile(values, [_OUTER, 1 - _OUTER], axis=0).T)

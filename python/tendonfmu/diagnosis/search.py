@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -226,10 +227,12 @@ class Trial:
 class ExtensionSearch(CauseSearch):
     """Adds cause after cause to a base, and keeps the model with all of them."""
 
+    events: tuple[Event, ...] = ()  # contact and stalls, which the samples of the base lack
+
     def __init__(self, base: Base, least_gain: float) -> None:
         super().__init__(MOST_CAUSES + len(base.start))
         self.base, self.model, self._least_gain = base, base.model, least_gain
-        self.first = base.look(base.nominal, ())
+        self.first = base.look(base.nominal, ())  # what the nominal description lacks and leaves
         self.causes = [_of_start(terms) for terms in base.start]
 
     def run(self, step: Step) -> None:
@@ -314,12 +317,13 @@ class ExtensionSearch(CauseSearch):
         self.causes += [_of_start(terms) for terms in memory]
         return other
 
+    @cached_property
     def small(self) -> list[Judged]:
-        """Return the best place of every effect that is certain but not material."""
+        """What was refused, and the best place of every other effect that is certain but not material."""
         selection, known = self.view.selection, {refused.effect for refused in self.refused}
         gains = [(cause, *selection.gain(cause)) for cause in selection.ranked(known)]
         named = [self._named(cause, selection) for cause, gain, error in gains if gain > CERTAIN * error]
-        return [cause for cause in named if cause.p_value < SIGNIFICANCE]
+        return [*self.refused, *(cause for cause in named if cause.p_value < SIGNIFICANCE)]
 
 
 def _best_of(trials: Sequence[Trial]) -> Trial:
@@ -346,20 +350,7 @@ def _of_start(terms: tuple[Term, ...]) -> Judged:
 # --- from recordings to causes ---------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Search:
-    """The result of a search."""
-
-    base: Base  # its samples, without events
-    extended: FittedModel
-    first: View  # what the nominal and the extended description lack and leave
-    last: View
-    causes: tuple[Judged, ...]  # in the order in which they were found
-    small: tuple[Judged, ...]  # effects that are certain but not material
-    events: tuple[Event, ...]  # contact and stalls
-
-
-def search(base: Base, *, least_gain: float, seed: int, phases: Phases) -> Search:
+def search(base: Base, *, least_gain: float, seed: int, phases: Phases) -> ExtensionSearch:
     """Search for the causes that a description lacks."""
     with phases.start("contact"):
         whole = base.samples
@@ -368,12 +359,10 @@ def search(base: Base, *, least_gain: float, seed: int, phases: Phases) -> Searc
     with phases.start("causes", MOST_CAUSES) as step:
         searched = ExtensionSearch(base, least_gain)
         searched.run(step)
-    if events:
-        # drop events that the causes explain
-        left, _ = events_of(searched.model.data, whole, seed)
-        events = tuple(event for event in events if any(_overlap(event, other) for other in left))
-    small, causes = (*searched.refused, *searched.small()), tuple(searched.causes)
-    return Search(base, searched.model, searched.first, searched.view, causes, small, events)
+    # drop events that the causes explain
+    left = events_of(searched.model.data, whole, seed)[0] if events else ()
+    searched.events = tuple(event for event in events if any(_overlap(event, other) for other in left))
+    return searched
 
 
 def _overlap(one: Event, other: Event) -> bool:

@@ -20,9 +20,9 @@ import numpy as np
 from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.candidate_columns import CandidateColumns, Proposal, candidate_columns
 from tendonfmu.diagnosis.effects import Mechanism, Term, Where
-from tendonfmu.diagnosis.experiments.menu import Entry, combined, loads, motions, own_tension, recorded_of, tensions
-from tendonfmu.diagnosis.experiments.motion import expected_recording, perform
 from tendonfmu.diagnosis.extension_fit import number_columns
+from tendonfmu.diagnosis.menu import Entry, combined, loads, motions, own_tension, recorded_of, tensions
+from tendonfmu.diagnosis.motion import expected_recording, perform
 from tendonfmu.diagnosis.names import Names, at_place, names_in
 from tendonfmu.diagnosis.result import Experiment
 from tendonfmu.diagnosis.samples import Samples, Span, span_of
@@ -228,7 +228,8 @@ class _Laboratory:
         """Return the power of the cause at its magnitudes that neither the model nor the rival explains."""
         explaining = list(range(self.nominal_count))
         if question.rival is not None:
-            explaining += self._all_columns(question.rival)
+            columns = [proposal.columns for proposal in self._proposals(question.rival)]
+            explaining += range(self.nominal_count + columns[0].start, self.nominal_count + columns[-1].stop)
         return _schur(gram, self._direction(question.cause), explaining)
 
     def _proposals(self, cause: Term) -> list[Proposal]:
@@ -249,16 +250,9 @@ class _Laboratory:
         """Return the magnitudes of the cause in all columns [c]."""
         assert self.columns is not None
         proposal = self._proposals(cause)[0]
-        given = list(cause.magnitudes) if len(cause.magnitudes) else list(proposal.variant.expected)
         direction = np.zeros(self.nominal_count + self.columns.values.shape[2])
-        direction[self.nominal_count + proposal.columns.start : self.nominal_count + proposal.columns.stop] = given
+        direction[self.nominal_count :][proposal.columns] = cause.magnitudes or proposal.variant.expected
         return direction
-
-    def _all_columns(self, cause: Term) -> list[int]:
-        proposals = self._proposals(cause)
-        return list(
-            range(self.nominal_count + proposals[0].columns.start, self.nominal_count + proposals[-1].columns.stop)
-        )
 
     def _rows(self, cause: Term, seen: _Seen) -> float:
         """Return the number of blocks times joints in which the cause makes a noticeable torque."""
@@ -286,10 +280,8 @@ def _schur(gram: Numbers, direction: Numbers, explaining: Sequence[int]) -> floa
 def _asked(questions: Sequence[Question]) -> list[Term]:
     """Return every mechanism at a place once, with the shape of its first mention."""
     causes: dict[tuple[str, Any], Term] = {}
-    for question in questions:
-        for cause in (question.cause, question.rival):
-            if cause is not None:
-                causes.setdefault((cause.mechanism.name, cause.place), cause)
+    for cause in (cause for question in questions for cause in (question.cause, question.rival) if cause is not None):
+        causes.setdefault((cause.mechanism.name, cause.place), cause)
     return list(causes.values())
 
 
@@ -308,14 +300,10 @@ def _restricted(cause: Term, data: Data, span: Span) -> Mechanism:
 def _mean_load(data: Data, recordings: Sequence[FitRecording]) -> Numbers:
     """Return the mean known load on the joints, N·m [n]."""
     arms = moment_arms(data)
-    loads = [
-        (recording.recording.groups["tendon_force"] @ arms - recording.target).mean(axis=0) for recording in recordings
-    ]
-    return (
-        np.asarray(np.mean(loads, axis=0))
-        if any(recording.external is not None for recording in recordings)
-        else np.zeros(arms.shape[1])
-    )
+    if all(recording.external is None for recording in recordings):
+        return np.zeros(arms.shape[1])
+    pulled = [(recording.recording.groups["tendon_force"] @ arms - recording.target) for recording in recordings]
+    return np.asarray(np.mean([load.mean(axis=0) for load in pulled], axis=0))
 
 
 def _shortened(recording: FitRecording) -> FitRecording:
