@@ -2,12 +2,11 @@
 
 - `inputs` reads and checks recordings; `base` settles delay, position-dependent torque and memory.
 - `samples` is what runs of the core are compared with, and its signals; `view` turns both into columns.
-- `result` holds what the search names, from the candidate that is tried to the page.
-- `selection` judges candidates; `search` judges all corrections of sensors together and adds what a description
-  lacks, `change_search` finds what has changed since a reference.
-- `extension_fit` fits the extended finger; `gain` measures on unseen data.
-- `extension_diagnosis` and `change_diagnosis` confirm and report; `diagnosis` begins.
-- `experiments` finds what to record next; `effects` holds the table of effects.
+- A mechanism (`effects`) at a place is a candidate (`candidate_columns`), with gain and certainty it is judged
+  (`selection`), with its numbers a cause (`result`).
+- `search` adds what a description lacks, one cause after the other; `change_search` finds what has changed since a
+  reference. `extension_diagnosis` and `change_diagnosis` confirm and report; `diagnosis` begins.
+- `extension_fit` fits the extended finger; `gain` measures on unseen data; `next_experiment` finds what to record.
 """
 
 from typing import TYPE_CHECKING

@@ -201,7 +201,7 @@ def find_kinematic_causes(given: Input, least_gain: float, seed: int) -> Kinemat
     every = [each for each in known.values() if each.where.effect != ZERO]
     every += [each for each in known.values() if each.where in single]
     off = [each for each in (*every, *offsets) if _is_certain(each, len(known))]
-    keys = known | {Where(ENCODER, j): each for j, each in _by_joint(data, known)}
+    keys = known | {each.where: each for each in _by_joint(data, known)}
     warnings = () if reference else tuple(varying_sentences(given.finger, learned))
     found = replace(none, known=keys, warnings=warnings)
     if is_long:
@@ -258,8 +258,7 @@ def _zero(routing: TendonRouting) -> tuple[Learned, float]:
     off = zero.off + force * (1.0 / spring.value - 1.0 / spring.described)
     if not spring.is_known or abs(off) >= abs(zero.off):
         return zero, 0.0
-    p_value = 2.0 * float(ndtr(-1.96 * abs(off) / max(zero.half, 1e-300)))
-    return replace(zero, value=zero.described + off, p_value=p_value), force
+    return replace(zero, value=zero.described + off, p_value=_p_value(off, zero.half)), force
 
 
 # --- zeros ------------------------------------------------------------------------------------------------------------
@@ -272,19 +271,18 @@ def _offsets(data: Data, known: dict[Where, Off]) -> tuple[list[Off], set[Where]
         return [], set()
     found = encoder_offsets(*_of_zeros(data, zeros))
     numbers = zip(found.joints.tolist(), found.offset.tolist(), found.half.tolist(), strict=True)
-    offsets = [_encoder(j, offset, half) for j, offset, half in numbers]
-    return offsets, {zero.where for zero, alone in zip(zeros, found.single, strict=True) if alone}
+    alone = {zero.where for zero, single in zip(zeros, found.single, strict=True) if single}
+    return [_encoder(j, offset, half) for j, offset, half in numbers], alone
 
 
-def _by_joint(data: Data, known: dict[Where, Off]) -> Iterator[tuple[int, Off]]:
-    """Yield (joint from 1, its encoder's offset if it explained the zeros alone)."""
-    zeros = _zeros(known)
-    if zeros:
+def _by_joint(data: Data, known: dict[Where, Off]) -> Iterator[Off]:
+    """Yield what each joint's encoder would be off by if it explained the zeros alone."""
+    if zeros := _zeros(known):
         off, known_to, arms = _of_zeros(data, zeros)
-        for j in np.flatnonzero(arms.any(axis=0)):
+        for j in np.flatnonzero(arms.any(axis=0)).tolist():
             own = arms[:, j] != 0.0
             offset, half = offset_of(off[own], known_to[own], arms[own][:, [j]])
-            yield int(j) + 1, _encoder(int(j), float(offset[0]), float(half[0]))
+            yield _encoder(j, float(offset[0]), float(half[0]))
 
 
 def _zeros(known: dict[Where, Off]) -> list[Off]:
@@ -293,15 +291,18 @@ def _zeros(known: dict[Where, Off]) -> list[Off]:
 
 def _of_zeros(data: Data, zeros: Sequence[Off]) -> tuple[Numbers, Numbers, Numbers]:
     """Return how far zeros are off, to what they are known (m) [t], and the arms of their tendons [t, n]."""
-    numbers = [zero.number for zero in zeros]
-    off, known_to = (np.array(values) for values in zip(*((each.off, each.known_to) for each in numbers), strict=True))
+    off, known_to = (np.array([getattr(zero.number, name) for zero in zeros]) for name in ("off", "known_to"))
     return off, known_to, moment_arms(data)[[(zero.where.tendon or 1) - 1 for zero in zeros]]
 
 
 def _encoder(j: int, offset: float, half: float) -> Off:
-    p_value = 2.0 * float(ndtr(-1.96 * abs(offset) / max(half, 1e-300)))
-    number = Learned(f"joint_position[{j + 1}]", offset, half, 0.0, True, 0.0, p_value)
+    number = Learned(f"joint_position[{j + 1}]", offset, half, 0.0, True, 0.0, _p_value(offset, half))
     return Off(Where(ENCODER, j + 1), number, LEAST_ANGLE)
+
+
+def _p_value(off: float, half: float) -> float:
+    """Return the p-value of a number that is off, from the half of its 95 % interval."""
+    return 2.0 * float(ndtr(-1.96 * abs(off) / max(half, 1e-300)))
 
 
 # --- causes -----------------------------------------------------------------------------------------------------------

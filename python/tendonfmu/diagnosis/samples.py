@@ -42,15 +42,11 @@ class Series(BlockSeries):
     travel: Numbers  # travel since the joint last reversed, rad [B, n]
 
 
-def _image(data: Mapping[str, Any]) -> Any:
-    """Return the image of a description with a bias that only jumps and without contact detection."""
-    bare = without_learning(data)
-    return native.image_from_json(json.dumps({**bare, "bias": {**bare["bias"], "forget_rate": 0.0}}))
-
-
 def exact_model(data: Mapping[str, Any], recording: FitRecording, *, jumps: bool = True) -> Numbers:
     """Return G of a description from a run of the core, N·m [N, n]; NaN outside of the parts."""
-    image, residual = _image(data), np.full(recording.target.shape, np.nan)
+    bare = without_learning(data)  # with a bias that only jumps, and without contact detection
+    image = native.image_from_json(json.dumps({**bare, "bias": {**bare["bias"], "forget_rate": 0.0}}))
+    residual = np.full(recording.target.shape, np.nan)
     for part in recording.parts:
         arrays = recording.arrays(part)
         outputs = native.Instance(image, kinematics_source=recording.kinematics).run(arrays)
@@ -63,30 +59,27 @@ def exact_model(data: Mapping[str, Any], recording: FitRecording, *, jumps: bool
 # --- the series -------------------------------------------------------------------------------------------------------
 
 
-def make_series(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, left: Numbers) -> Series:
+def make_series(
+    data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, left: Numbers, used: Flags
+) -> Series:
     """Average the signals over the blocks of a grid; `left` is what a description leaves of the torque [B, n], N·m."""
-    whole = [recordings[segment.recording] for segment in grid.segments]
-    pieces = list(zip(grid.segments, whole, strict=True))
-    threshold, arms = number_of(data, "velocity_threshold.joint"), moment_arms(data)
-    velocity = grid.means([recording.model.joint_speed for recording in recordings])
+    threshold, segments = number_of(data, "velocity_threshold.joint"), grid.segments
+    angles, speeds = ([getattr(each.model, name) for each in recordings] for name in ("joint_angle", "joint_speed"))
+    velocity = grid.means(speeds)
+    travels = [_travel(angles[one.recording], speeds[one.recording], threshold, one) for one in segments]
     return Series(
         time=grid.means([recording.time for recording in recordings]),
-        recording=np.concatenate([np.full(segment.count, segment.recording) for segment in grid.segments]),
-        segment=np.concatenate([np.full(segment.count, k) for k, segment in enumerate(grid.segments)]),
+        recording=np.concatenate([np.full(segment.count, segment.recording) for segment in segments]),
+        segment=np.concatenate([np.full(segment.count, k) for k, segment in enumerate(segments)]),
         target=left,
-        used=np.concatenate([segment.mean(recording.train[segment.part]) == 1.0 for segment, recording in pieces]),
+        used=used,
         step=grid.step,
-        angle=grid.means([recording.model.joint_angle for recording in recordings]),
+        angle=grid.means(angles),
         velocity=velocity,
-        acceleration=np.concatenate([_slope(velocity[segment.blocks], grid.step) for segment in grid.segments]),
+        acceleration=np.concatenate([_slope(velocity[segment.blocks], grid.step) for segment in segments]),
         force=grid.forces(recordings),
-        tendon_velocity=_tendon_velocity(arms, velocity),
-        travel=np.concatenate(
-            [
-                _travel(recording.model.joint_angle, recording.model.joint_speed, threshold, segment)
-                for segment, recording in pieces
-            ]
-        ),
+        tendon_velocity=_tendon_velocity(moment_arms(data), velocity),
+        travel=np.concatenate(travels),
     )
 
 
@@ -171,7 +164,7 @@ class Samples:
 
     def series(self, data: Data) -> Series:
         """Return the block means of a description's signals and of what it leaves."""
-        return replace(make_series(data, self.recordings, self.grid, self.left(data)), used=self.used)
+        return make_series(data, self.recordings, self.grid, self.left(data), self.used)
 
     def of_recordings(self, data: Data, recordings: Sequence[FitRecording]) -> Samples:
         """Return the samples with the forces of other recordings of the same times; the measured torque stays."""

@@ -361,9 +361,9 @@ def search(base: Base, *, least_gain: float, seed: int, phases: Phases) -> Exten
         searched.run(step)
     # drop events that the causes explain
     left = events_of(searched.model.data, whole, seed)[0] if events else ()
-    searched.events = tuple(event for event in events if any(_overlap(event, other) for other in left))
+    searched.events = tuple(
+        event
+        for event in events
+        if any(one.recording == event.recording and one.start < event.end and event.start < one.end for one in left)
+    )
     return searched
-
-
-def _overlap(one: Event, other: Event) -> bool:
-    return one.recording == other.recording and one.start < other.end and other.start < one.end
