@@ -246,7 +246,7 @@ def assert_all_columns(case: Case, name: str) -> None:
         assert case.left(variant.data) == pytest.approx(case.left(case.data), rel=1e-9, abs=1e-10)
         for k, column in enumerate(variant.columns):
             expected = by_difference(case, variant.data, column.numbers, column.expected)
-            assert_column(values[:, :, k], expected, column.expected, f"{name} {variant.shape} {column.path}")
+            assert_column(values[:, :, k], expected, column.expected, f"{name} {variant.shape} {list(column.numbers)}")
 
 
 def test_columns_of_numbers_are_differences_of_the_core(case: Case) -> None:

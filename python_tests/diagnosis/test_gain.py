@@ -160,13 +160,13 @@ def test_a_hidden_effect_is_fitted_and_its_gain_is_true() -> None:
     unseen = Unseen(before.data, [training], [test])
     gains = [unseen.gain(each, found.data, 0) for each in without]
     assert gains[0].low > 0.1 and gains[1].high < 0.05
-    assert result.value.value > 0.0 and not result.held_out
+    assert result.gain.value > 0.0 and not result.held_out
     first, _, last = result.steps
-    assert 1 - last / first == pytest.approx(result.value.value)
+    assert 1 - last / first == pytest.approx(result.gain.value)
     assert result.steps[1] == pytest.approx(last, rel=0.05)
     assert all(a < b for a, b in zip(result.extended.test_rms, result.bias_only_rms, strict=True))
     blocks = measure_gain(before.data, found.data, [prepared(truth, 1, holdout=0.3)])
-    assert blocks.held_out and blocks.value.low > 0
+    assert blocks.held_out and blocks.gain.low > 0
 
 
 def test_a_bias_does_not_hide_what_is_slow() -> None:

@@ -158,8 +158,11 @@ def _delay_of_torque(model: FittedModel, samples: Samples, least: LeastSizes) ->
     """Return a delay of forces that is too large for its derivative, beside a fitted model; () if there is none."""
     if not DELAY.places(model.data, samples.recordings[0].kinematics):
         return ()
-    delays = _delays(float(np.median(np.diff(samples.recordings[0].time))))
-    moved = np.stack([_late_torque(samples, delay) for delay in delays], axis=2)
+    # a grid of all delays that a description accepts, including 0
+    grid = max(2 * FINE, float(np.median(np.diff(samples.recordings[0].time))) / 2)
+    delays = grid * np.arange(-int(LONGEST_DELAY / grid), int(LONGEST_DELAY / grid) + 1)
+    late = ([shifted(each, each.target, delay) - each.target for each in samples.recordings] for delay in delays)
+    moved = np.stack([samples.grid.means(changes) for changes in late], axis=2)
     view = look(model.data, samples, least, (), model)
     errors = view.grams.errors_of(view.series.target[:, :, None] + moved)
     still, best = int(np.argmin(np.abs(delays))), int(np.argmin(errors))
@@ -179,13 +182,6 @@ def _delay_of_positions(data: Data, samples: Samples, least: LeastSizes) -> tupl
 
 def _late(delay: float) -> tuple[Term, ...]:
     return (Term(DELAY, Place(), {"delay": delay}, (1.0,)),)
-
-
-def _delays(step: float) -> Numbers:
-    """Return a grid of all delays that a description accepts, including 0."""
-    grid = max(2 * FINE, step / 2)
-    count = int(LONGEST_DELAY / grid)
-    return np.asarray(grid * np.arange(-count, count + 1), dtype=np.float64)
 
 
 def delay_of_positions(data: Mapping[str, Any], recordings: Sequence[FitRecording]) -> float | None:
@@ -216,8 +212,3 @@ def delay_of_positions(data: Mapping[str, Any], recordings: Sequence[FitRecordin
         return None
     before, at, after = errors[best - 1 : best + 2]
     return float(delays[best] + FINE * 0.5 * (before - after) / max(before - 2 * at + after, 1e-300))
-
-
-def _late_torque(samples: Samples, delay: float) -> Numbers:
-    """Return the change of the block means of the target if it is taken `delay` s later, N·m [B, n]."""
-    return samples.grid.means([shifted(each, each.target, delay) - each.target for each in samples.recordings])

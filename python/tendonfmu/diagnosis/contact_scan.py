@@ -27,7 +27,6 @@ from tendonfmu.arrays import Data, Flags, Numbers, flagged_rows
 from tendonfmu.detect import (
     SETTLING,
     ContactTuning,
-    DetectionScore,
     Subject,
     TuneWarning,
     free_parts,
@@ -326,7 +325,8 @@ def detection_gain(nominal: Data, extended: Data, recordings: Sequence[FitRecord
         tuned = [_tuned(data, free, kinematics, min(max(RATE, 1.0 / hours), HIGHEST)) for data in (nominal, extended)]
     except InputError:  # nothing can be tuned, for example with a bias without drift
         return None
-    before, after = (_score(tuning.description_.data, labelled, kinematics) for tuning in tuned)
+    subjects = [Subject(Path("finger"), finger_from_data(tuning.description_.data), packed=False) for tuning in tuned]
+    before, after = (pooled([run_track(one, each, kinematics, None).score() for each in labelled]) for one in subjects)
     delays = [float(np.median(score.delays)) if len(score.delays) else None for score in (before, after)]
     return DetectionGain(
         events=len(before.events),
@@ -383,8 +383,3 @@ def _tuned(data: Data, free: Sequence[Recording], kinematics: int, rate: float) 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", TuneWarning)
         return tuning.tune(list(free), checked=True)
-
-
-def _score(data: Data, recordings: Sequence[Recording], kinematics: int) -> DetectionScore:
-    subject = Subject(Path("finger"), finger_from_data(data), packed=False)
-    return pooled([run_track(subject, recording, kinematics, None).score() for recording in recordings])

@@ -90,11 +90,6 @@ def memory_of(data: Data) -> list[Row]:
     return [row for row in data.get("extensions") or [] if row["effect"] in (PRESLIDING, CORDS)]
 
 
-def needs_presliding(term: Term) -> bool:
-    """Return whether a term is part of a memory that presliding has to be there for."""
-    return term.mechanism.name in (RELAXATION, CORDS)
-
-
 def _term(name: str, rows: tuple[Row, ...]) -> MemoryTerm:
     return MemoryTerm(by_name(name), Place(), rows=rows)
 
@@ -336,7 +331,8 @@ def possible(data: Mapping[str, Any], causes: Sequence[Term]) -> list[Term]:
     kept = []
     for cause in causes:
         path = changed_law(cause)
-        if needs_presliding(cause) and not any(row["effect"] == PRESLIDING for row in memory_of(data)):
+        alone = not any(row["effect"] == PRESLIDING for row in memory_of(data))
+        if cause.mechanism.name in (RELAXATION, CORDS) and alone:  # they are part of a memory that has presliding
             continue
         if path is None or any(effect.path == path for effect in effects(data)):
             data = cause.added_to(data)

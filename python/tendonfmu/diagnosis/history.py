@@ -217,20 +217,20 @@ def _history(finger: str, references: Sequence[str], known: Sequence[Known], fai
         times, dated = times_of(recordings)
     titles = {tuple(cause["where"]): cause["title"] for _, row, _ in known for cause in row["causes"]}
     lines = [_line(Where(*key), title, known, times) for key, title in titles.items()]
+
+    def importance(line: Line) -> tuple[int, float]:
+        return sum(size.named for size in line.sizes), max(size.gain for size in line.sizes)
+
     return History(
         finger=finger,
         references=tuple(references),
         recordings=tuple(recordings),
         times=times,
         dated=dated,
-        lines=tuple(sorted((line for line in lines if line.sizes), key=_importance, reverse=True)),
+        lines=tuple(sorted((line for line in lines if line.sizes), key=importance, reverse=True)),
         verdicts=tuple(str(row["verdict"]) for _, row, _ in known),
         failed=tuple(failed.items()),
     )
-
-
-def _importance(line: Line) -> tuple[int, float]:
-    return sum(size.named for size in line.sizes), max(size.gain for size in line.sizes)
 
 
 def _line(where: Where, title: str, known: Sequence[Known], times: Sequence[float]) -> Line:

@@ -58,12 +58,6 @@ EXPLANATIONS = {
 }
 
 
-def size_of_all(effect: str, sizes: Sequence[ChangedSize], is_change: bool) -> str:
-    """Return the size of a cause in words, the largest first."""
-    where = f", at the largest of {len(sizes)} places" if len(sizes) > 1 else ""
-    return f"{_size(effect, sizes[0], is_change)}{where}"
-
-
 def _size(effect: str, size: ChangedSize, is_change: bool) -> str:
     then, now = ("then", "now") if is_change else ("described", "recorded")
     if effect == ENCODER:
@@ -322,6 +316,7 @@ def _causes(
         joints, tendons = ({getattr(each.where, name) for each in own} for name in ("joint", "tendon"))
         where = Where(effect, *(kind.pop() if len(kind) == 1 else None for kind in (joints, tendons)))
         rivals = dict.fromkeys(rival for each in own for rival in _rivals(each.where, arms))
+        at_largest = f", at the largest of {len(own)} places" if len(own) > 1 else ""
         yield Cause(
             where,
             title_of(effect),
@@ -330,7 +325,7 @@ def _causes(
             gain=gain_of(own),
             gain_unit="m",
             confusable_with=tuple(rivals),
-            size=size_of_all(effect, [each.size for each in own], found.is_change),
+            size=_size(effect, own[0].size, found.is_change) + at_largest,
             places=tuple(CausePlace(*each.where.place, {}) for each in own),
             changed=own[0].size if found.is_change else None,
         )

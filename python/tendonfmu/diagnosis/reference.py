@@ -152,15 +152,14 @@ def _repeat(series: Series, force: Numbers, then: int, now: int) -> Repeat | Non
         if (
             moves.any()
             and (apart[moves] <= SAME_ANGLES * spread[moves]).all()
-            and _same_load(force, rows, begin, end, lag)
+            and _same_load(force[rows[0]][begin:end], force[rows[1]][begin + lag : end + lag])
         ):
             shift = float(time[1][begin + lag] - time[0][begin])
             return Repeat(then, now, shift, float(time[0][begin]), float(time[0][end - 1]))
     return None
 
 
-def _same_load(force: Numbers, rows: Sequence[Flags], begin: int, end: int, lag: int) -> bool:
-    one, other = force[rows[0]][begin:end], force[rows[1]][begin + lag : end + lag]
+def _same_load(one: Numbers, other: Numbers) -> bool:
     apart = np.sqrt(np.mean((one - other) ** 2, axis=0))
     return bool((apart <= SAME_FORCES * np.sqrt(np.mean(one**2, axis=0))).all())
 

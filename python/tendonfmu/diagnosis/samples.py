@@ -228,16 +228,11 @@ def predicted_forces(data: Mapping[str, Any], recordings: Sequence[FitRecording]
         changed = {"tendon_force": predicted}
         if "tendon_position" in groups:
             # a description with a delay pairs the present position with the force `delay` s later
-            change = shifted(recording, (predicted - force) / stiffness, _delay(data))
+            delay = float(sum(row["delay"] for row in extension_rows(data) if row["effect"] == "time_delay"))
+            change = shifted(recording, (predicted - force) / stiffness, delay)
             changed["tendon_position"] = groups["tendon_position"] + change
         moved.append(recording.with_groups(**changed))
     return moved
-
-
-def _delay(data: Mapping[str, Any]) -> float:
-    """Return by how many seconds forces come later than positions, according to the description."""
-    rows = data.get("extensions") or []
-    return float(sum(row["delay"] for row in rows if row["effect"] == "time_delay"))
 
 
 def shifted(recording: FitRecording, values: Numbers, delay: float) -> Numbers:
