@@ -167,13 +167,14 @@ class Changes:
             reported(search.causes[k], own, **with_sizes_by_recording(search, k, sized(search, k)))
             for k, own in enumerate(compared)
         ]
-        series, views, load = search.series, self._views(), self._load()
+        series, load, before = search.series, self._load(), search.samples.residual(search.data)
+        after = search.samples.residual(search.now_data()) if search.causes else before
         durations = [sum(recording.duration for recording in side) for side in (given.training, self._reference)]
         events = unusual(self._events, self._usual, durations[0] / durations[1])
         return answered(
             self._asked,
             gain,
-            (replace(series, used=series.used & search.now), *views),
+            (replace(series, used=series.used & search.now), before, after),
             causes=causes,
             unexplained=self._unexplained(),
             warnings=self._warnings(),
@@ -222,12 +223,6 @@ class Changes:
             added = added - added[search.series.used].mean(axis=0)
             compared.append(Compared(search.series, left + added, left, added, now, reference))
         return compared
-
-    def _views(self) -> tuple[Numbers, Numbers]:
-        """Return what the reference model leaves of all recordings, without the changes and with them, N·m [B, n]."""
-        search = self._search
-        before = search.samples.residual(search.data)
-        return before, search.samples.residual(search.now_data()) if search.causes else before
 
     def _warnings(self) -> list[str]:
         folds, judged = self._search.folds, self._search.judged

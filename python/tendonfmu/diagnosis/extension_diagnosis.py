@@ -27,7 +27,7 @@ from tendonfmu.diagnosis.gain import Gain, Unseen, measure_gain
 from tendonfmu.diagnosis.names import size_of
 from tendonfmu.diagnosis.next_experiment import Experiments, Question, plan_experiments
 from tendonfmu.diagnosis.remainder import measure_remainder, remainder_map, unexplained_of
-from tendonfmu.diagnosis.result import Cause, CausePlace, Diagnosis, Event, Invisible, Unexplained, by_gain
+from tendonfmu.diagnosis.result import Cause, CausePlace, Diagnosis, Invisible, Unexplained, by_gain
 from tendonfmu.diagnosis.samples import Samples, Span, as_described, span_of
 from tendonfmu.diagnosis.search import ExtensionSearch, calibrated, search, terms_of
 from tendonfmu.diagnosis.selection import SIGNIFICANCE, Judged, confirmed, invisible_effects, names_needed, step_p_value
@@ -259,15 +259,13 @@ class Lacks:
 
     def _verified(self) -> Verified:
         searched, given, asked = self._searched, self._given, self._asked
-        unseen = [self._events_in(recording) for recording in given.tests]
+        data, threads = searched.model.data, asked.settings.threads
+        each = [Samples.of(data, [recording], threads) for recording in given.tests]
+        unseen = [events_of(data, samples, asked.seed)[0] for samples in each]
         tests = [without_events(recording, events) for recording, events in zip(given.tests, unseen, strict=True)]
         self._events = (*searched.events, *(event for events in unseen for event in events))
         training = [without_events(recording, searched.events) for recording in given.training]
         return _Bench(searched, training, tests, asked.seed).verified(asked.least_gain)
-
-    def _events_in(self, recording: FitRecording) -> Sequence[Event]:
-        data = self._searched.model.data
-        return events_of(data, Samples.of(data, [recording], self._asked.settings.threads), self._asked.seed)[0]
 
     # --- causes ---
 

@@ -98,11 +98,8 @@ class Experiments:
         if not self.answers:
             return self.best.sentence
         answer = self.answers[number]
-        return (
-            answer.entry.sentence
-            if answer.separates
-            else f"{NONE} show it. {answer.question.cause.mechanism.explanation}"
-        )
+        explanation = answer.question.cause.mechanism.explanation
+        return answer.entry.sentence if answer.separates else f"{NONE} show it. {explanation}"
 
 
 def plan_experiments(

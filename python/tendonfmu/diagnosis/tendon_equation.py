@@ -225,13 +225,11 @@ def _explained(off: Numbers, known_to: Numbers, arms: Numbers, sets: Iterator[Se
                 break
             # without which zero do the others agree best?
             options = np.flatnonzero(beyond > 1.0)
-            left = [_left(off, known_to, own, kept & (np.arange(len(off)) != i)) for i in options]
+            left = []
+            for others in (kept & (np.arange(len(off)) != i) for i in options):
+                offset, _ = offset_of(off[others], known_to[others], own[others])
+                left.append(float((_beyond(off, known_to, own, offset)[others] ** 2).sum()))
             kept[options[int(np.argmin(left))]] = False
-
-
-def _left(off: Numbers, known_to: Numbers, arms: Numbers, kept: Flags) -> float:
-    offset, _ = offset_of(off[kept], known_to[kept], arms[kept])
-    return float((_beyond(off, known_to, arms, offset)[kept] ** 2).sum())
 
 
 def _beyond(off: Numbers, known_to: Numbers, arms: Numbers, offset: Numbers) -> Numbers:
