@@ -14,10 +14,10 @@ from tendonfmu.diagnosis.candidate_columns import hypotheses
 from tendonfmu.diagnosis.effects import BY_NAME, Place, Term, Where
 from tendonfmu.diagnosis.extension_diagnosis import merged
 from tendonfmu.diagnosis.extension_fit import extended_description
-from tendonfmu.diagnosis.result import Cause, CausePlace
+from tendonfmu.diagnosis.result import CausePlace
 from tendonfmu.diagnosis.samples import as_described, corrected_arms
 from tendonfmu.diagnosis.search import PLAUSIBLE, Trial, beside_calibration, calibrated, calibration, is_better
-from tendonfmu.diagnosis.selection import Selection
+from tendonfmu.diagnosis.selection import Judged, Selection
 from tendonfmu.diagnosis.view import View
 
 Numbers = NDArray[np.float64]
@@ -43,7 +43,7 @@ def look(share: Numbers, alike: bool = False) -> tuple[View, Selection]:
     return view, Selection(grams, hypotheses(columns, np.full((4, 2), 1e3), np.ones(2)), UNSEEN)
 
 
-def judged(share: Numbers, alike: bool = False) -> tuple[Cause | None, Cause | None]:
+def judged(share: Numbers, alike: bool = False) -> tuple[Judged | None, Judged | None]:
     """All corrections together, and the best single one."""
     view, selection = look(share, alike)
     return calibration(view, selection, (), LEAST_GAIN), selection.best(LEAST_GAIN)
@@ -71,8 +71,8 @@ def test_one_sensor_that_is_off_keeps_its_name() -> None:
     assert not is_better(together, single, LEAST_GAIN)
     (alike,) = beside_calibration(Trial(single, None, single.unseen), together).cause.alike[-1:]
     assert alike.effect == "calibration"  # it may be several as well
-    few = Cause(Where("force_gain", None, 2), gain=together.gain, unseen=single.unseen)
-    weak = Cause(Where("calibration"), gain=type(few.gain)(0.1 * few.gain.value))
+    few = Judged(Where("force_gain", None, 2), gain=together.gain, unseen=single.unseen)
+    weak = Judged(Where("calibration"), gain=type(few.gain)(0.1 * few.gain.value))
     assert not beside_calibration(Trial(few, None, few.unseen), weak).cause.alike
 
 
@@ -114,7 +114,7 @@ def test_it_is_folded_back_into_the_description() -> None:
     """A single sensor that was found beside it belongs to it; all numbers of a place are together."""
     together, _ = judged(SEVERAL)
     assert together is not None
-    late = Cause(
+    late = Judged(
         Where("time_delay"), terms=(Term(BY_NAME["time_delay"], Place(), {"delay": 0.002}, (1.0,)),), p_value=1e-4
     )
     (cause,) = merged([late, together])
@@ -126,11 +126,11 @@ def test_it_is_folded_back_into_the_description() -> None:
     paths = [f"extensions[{k}]" for k in range(1, 1 + len(numbers))]
     places = tuple(
         CausePlace(
-            term.place.joint, term.place.tendon, {path: (number, "s" if term.candidate.name == "time_delay" else "1")}
+            term.place.joint, term.place.tendon, {path: (number, "s" if term.mechanism.name == "time_delay" else "1")}
         )
         for term, path, number in zip(cause.terms, paths, numbers, strict=True)
     )
-    found = calibrated(Cause(cause.where, terms=cause.terms, places=places, sensors=cause.sensors))
-    assert len(found.places) == 9 and sum(len(place.parameters) for place in found.places) == 9
-    assert found.sensors[-1].words == ("forces", "2\u00a0ms later than positions")
-    assert "more" in found.size and "tendon" in found.size
+    found = calibrated(cause, places, {})
+    assert len(found["places"]) == 9 and sum(len(place.parameters) for place in found["places"]) == 9
+    assert found["sensors"][-1].words == ("forces", "2\u00a0ms later than positions")
+    assert "more" in found["size"] and "tendon" in found["size"]

@@ -17,8 +17,8 @@ import pytest
 from numpy.typing import NDArray
 
 from tendonfmu.diagnosis.candidate_columns import CandidateColumns, Proposal, candidate_columns
-from tendonfmu.diagnosis.effects import CANDIDATES, Place, Variant, by_name
-from tendonfmu.diagnosis.effects.candidate import add_to_number
+from tendonfmu.diagnosis.effects import MECHANISMS, Place, Variant, by_name
+from tendonfmu.diagnosis.effects.mechanism import add_to_number
 from tendonfmu.diagnosis.extension_fit import number_columns
 from tendonfmu.diagnosis.samples import Samples, Span, span_of
 from tendonfmu.estimate import unknowns
@@ -120,7 +120,7 @@ class Case:
         return self.samples.left(data)
 
     def proposals(self, name: str) -> list[tuple[Proposal, Variant]]:
-        return [(each, each.variant) for each in self.columns.proposals if each.candidate.name == name]
+        return [(each, each.variant) for each in self.columns.proposals if each.mechanism.name == name]
 
 
 @pytest.fixture(scope="module")
@@ -145,12 +145,12 @@ def assert_column(found: NDArray[Any], expected: Numbers, ordinary: float, what:
 
 def test_every_effect_of_the_contract_has_a_candidate() -> None:
     assert (
-        tuple(candidate.name for candidate in CANDIDATES if candidate.name not in ("calibration", *MEMORY)) == CONTRACT
+        tuple(candidate.name for candidate in MECHANISMS if candidate.name not in ("calibration", *MEMORY)) == CONTRACT
     )
 
 
 def test_every_candidate_is_proposed(case: Case) -> None:
-    assert {proposal.candidate.name for proposal in case.columns.proposals} == set(CONTRACT)
+    assert {proposal.mechanism.name for proposal in case.columns.proposals} == set(CONTRACT)
 
 
 # --- places -----------------------------------------------------------------------------------------------------------
@@ -246,7 +246,7 @@ def assert_all_columns(case: Case, name: str) -> None:
         assert case.left(variant.data) == pytest.approx(case.left(case.data), rel=1e-9, abs=1e-10)
         for k, column in enumerate(variant.columns):
             expected = by_difference(case, variant.data, column.numbers, column.expected)
-            assert_column(values[:, :, k], expected, column.expected, f"{name} {variant.shape} {column.path}")
+            assert_column(values[:, :, k], expected, column.expected, f"{name} {variant.shape} {list(column.numbers)}")
 
 
 def test_columns_of_numbers_are_differences_of_the_core(case: Case) -> None:
@@ -268,7 +268,7 @@ def test_a_fit_estimates_what_is_added(case: Case, name: str) -> None:
     """All numbers of the term, also from magnitudes of 0: what is 0 would stay 0."""
     before = {number.path for number in unknowns(case.data)}
     for proposal, variant in case.proposals(name):
-        extended = proposal.candidate.extended(case.data, proposal.place, variant.shape, [0.0] * variant.count)
+        extended = proposal.mechanism.extended(case.data, proposal.place, variant.shape, [0.0] * variant.count)
         added = {number.path for number in unknowns(extended)} - before
         wanted = {f"extensions[{len(extended['extensions'])}]."} if variant.rows or variant.full is not None else set()
         for path in () if wanted else (path for column in variant.columns for path in column.numbers):

@@ -9,23 +9,24 @@ import numpy as np
 import pytest
 
 from fit_cases import small_finger
-from tendonfmu.diagnosis import extension_diagnosis
 from tendonfmu.diagnosis import extension_diagnosis as whole
 from tendonfmu.diagnosis.answer import not_taken
 from tendonfmu.diagnosis.effects import Place, Term, Where, by_name
 from tendonfmu.diagnosis.result import Cause
+from tendonfmu.diagnosis.selection import Judged, names_needed
 from tendonfmu.statistics import Interval
 
 
 def test_each_further_name_needs_more() -> None:
     """What every finger has does not count: presliding, a delay."""
-    causes = [Cause(Where(effect)) for effect in ("presliding", "gravity", "stribeck")]
-    gains = [Interval(0.9 - 0.1 * k, 0.0, 1.0) for k in range(len(causes))]
-    assert extension_diagnosis._needed(causes, gains) == [1.0, 1.0, 2.0]
+    effects = ("presliding", "gravity", "stribeck")
+    causes = [Judged(Where(effect), gain=Interval(0.9 - 0.1 * k, 0.0, 1.0)) for k, effect in enumerate(effects)]
+    assert names_needed(causes) == [1, 1, 2]
+    assert names_needed(causes[::-1]) == [2, 1, 1]
 
 
 def in_nominal(data: Any, effect: Term) -> bool:
-    made = whole._Result.__new__(whole._Result)
+    made = whole.Lacks.__new__(whole.Lacks)
     samples = SimpleNamespace(recordings=[SimpleNamespace(kinematics=1)])
     base = SimpleNamespace(nominal=SimpleNamespace(data=data), samples=samples)
     made._searched = cast("Any", SimpleNamespace(base=base))
@@ -54,9 +55,8 @@ def test_only_laws_of_the_nominal_description_are_asked_about(monkeypatch: pytes
 
 def test_a_cause_that_is_significant_is_too_small_or_uncertain() -> None:
     """Uncertain, it comes with what would settle it: more of the same motion, or another experiment."""
-    known = {"p_value": 1e-9, "terms": ()}
     small, wide, none = (
-        Cause(Where(effect), gain=Interval(*gain), **known)
+        Cause(Where(effect), gain=Interval(*gain), p_value=1e-9)
         for effect, gain in (
             ("inertia", (0.01, 0.005, 0.015)),
             ("gravity", (0.14, -0.05, 0.42)),

@@ -10,9 +10,18 @@ import pytest
 from numpy.typing import NDArray
 
 from made_columns import BLOCKS, JOINTS, UNSEEN, Made, candidate_columns, coloured, grams_of, waves
-from tendonfmu.diagnosis.candidate_columns import LARGEST, LARGEST_SCALING, LARGEST_SECANT, CandidateColumns, hypotheses
+from tendonfmu.diagnosis.candidate_columns import (
+    EVERYWHERE,
+    HERE,
+    LARGEST,
+    LARGEST_SCALING,
+    LARGEST_SECANT,
+    SOMEWHERE,
+    Candidate,
+    CandidateColumns,
+    hypotheses,
+)
 from tendonfmu.diagnosis.effects import Place, Where, by_name
-from tendonfmu.diagnosis.result import EVERYWHERE, HERE, SOMEWHERE, Cause
 from tendonfmu.diagnosis.selection import (
     BEFORE_FIT,
     CERTAIN,
@@ -48,7 +57,7 @@ def noise(seed: int) -> Numbers:
     return coloured(np.random.default_rng([seed, 4]))
 
 
-def hypotheses_of(columns: CandidateColumns) -> list[Cause]:
+def hypotheses_of(columns: CandidateColumns) -> list[Candidate]:
     """With arms so long that no correction of the torque is too large."""
     return hypotheses(columns, np.full((4, JOINTS), 1e3), np.ones(JOINTS))
 
@@ -65,8 +74,8 @@ def selection_of(
 FOUR = [Made("load_friction", j, i, sign=1, expected=(0.1 * j * i,)) for j in (1, 2) for i in (1, 2)]
 
 
-def keys(found: Sequence[Cause]) -> dict[tuple[object, ...], Cause]:
-    return {(each.direction.level, *astuple(each.where)): each for each in found}
+def keys(found: Sequence[Candidate]) -> dict[tuple[object, ...], Candidate]:
+    return {(each.level, *astuple(each.where)): each for each in found}
 
 
 def test_an_effect_of_surfaces_is_asked_for_everywhere_at_joints_at_tendons_and_at_each_place(columns: Numbers) -> None:
@@ -79,25 +88,24 @@ def test_an_effect_of_surfaces_is_asked_for_everywhere_at_joints_at_tendons_and_
         *((SOMEWHERE, name, None, i) for i in (1, 2)),
         *((HERE, name, j, i) for j in (1, 2) for i in (1, 2)),
     }
-    assert [each.direction.level for each in found] == sorted(each.direction.level for each in found)
+    assert [each.level for each in found] == sorted(each.level for each in found)
     # a magnitude of 1 is as much as is ordinary at each place
-    assert by_key[EVERYWHERE, name, None, None].direction.mix[:, 0] == pytest.approx([0.1, 0.2, 0.2, 0.4])
-    assert by_key[SOMEWHERE, name, 2, None].direction.mix[:, 0] == pytest.approx([0.0, 0.0, 0.2, 0.4])
+    assert by_key[EVERYWHERE, name, None, None].mix[:, 0] == pytest.approx([0.1, 0.2, 0.2, 0.4])
+    assert by_key[SOMEWHERE, name, 2, None].mix[:, 0] == pytest.approx([0.0, 0.0, 0.2, 0.4])
     tendon = by_key[SOMEWHERE, name, None, 2]
-    assert tendon.direction.mix[:, 0] == pytest.approx([0.0, 0.2, 0.0, 0.4])
+    assert tendon.mix[:, 0] == pytest.approx([0.0, 0.2, 0.0, 0.4])
     assert [(each.place, each.magnitudes) for each in tendon.terms] == [
         (Place(1, 2), (0.2,)),
         (Place(2, 2), (0.4,)),
     ]
-    assert by_key[HERE, name, 2, 1].direction.mix[:, 0] == pytest.approx([0.0, 0.0, 1.0, 0.0])
-    assert all(each.direction.low == [0.0] and each.direction.high[0] > 1.0 for each in found)
+    assert by_key[HERE, name, 2, 1].mix[:, 0] == pytest.approx([0.0, 0.0, 1.0, 0.0])
+    assert all(each.low == [0.0] and each.high[0] > 1.0 for each in found)
 
 
 def test_signs_bound_what_is_learned(columns: Numbers) -> None:
     made = [Made("cover_stiffness", 1, sign=1), Made("inertia", 1, sign=-1), Made("gravity", 1, sign=0)]
     bounds = {
-        each.effect: (*each.direction.low, *each.direction.high)
-        for each in hypotheses_of(candidate_columns(columns[:, :, :3], made))
+        each.effect: (*each.low, *each.high) for each in hypotheses_of(candidate_columns(columns[:, :, :3], made))
     }
     assert bounds == {"cover_stiffness": (0.0, LARGEST), "inertia": (-LARGEST, 0.0), "gravity": (-LARGEST, LARGEST)}
 
@@ -113,13 +121,13 @@ def test_corrections_of_the_torque_have_a_largest_size(columns: Numbers) -> None
     arms = np.array([[0.01, 0.01], [0.004, -0.008]])
     reach = np.array([1.0, 0.5])
     found = {each.effect: each for each in hypotheses(candidate_columns(columns[:, :, :4], made), arms, reach)}
-    assert (found["force_gain"].direction.low, found["force_gain"].direction.high) == (
+    assert (found["force_gain"].low, found["force_gain"].high) == (
         -LARGEST_SCALING,
         LARGEST_SCALING,
     )
-    assert found["moment_arm"].direction.high == pytest.approx([LARGEST_SCALING * 0.008])
-    assert found["moment_arm_variation"].direction.high == pytest.approx([LARGEST_SCALING * 0.008 / 0.5])
-    assert found["load_friction"].direction.high == [LARGEST]
+    assert found["moment_arm"].high == pytest.approx([LARGEST_SCALING * 0.008])
+    assert found["moment_arm_variation"].high == pytest.approx([LARGEST_SCALING * 0.008 / 0.5])
+    assert found["load_friction"].high == [LARGEST]
 
 
 def test_alike_shapes_go_together_and_each_law_has_its_own(columns: Numbers) -> None:
@@ -127,10 +135,8 @@ def test_alike_shapes_go_together_and_each_law_has_its_own(columns: Numbers) -> 
     shapes = ({"stribeck_velocity": 0.1}, {"stribeck_velocity": 0.3}, {"rises": 1.0, "stribeck_velocity": 0.1})
     pulley = tuple({"pulley": 1.0, **shape} for shape in shapes[:2])
     made = [Made("stribeck", 1, 1, shapes=(*shapes, *pulley)), Made("stribeck", 2, 1, shapes=shapes)]
-    found = [
-        each for each in hypotheses_of(candidate_columns(columns[:, :, :8], made)) if each.direction.level == EVERYWHERE
-    ]
-    assert [np.flatnonzero(each.direction.mix[:, 0]).tolist() for each in found] == [[0, 3, 5], [1, 4, 6]]
+    found = [each for each in hypotheses_of(candidate_columns(columns[:, :, :8], made)) if each.level == EVERYWHERE]
+    assert [np.flatnonzero(each.mix[:, 0]).tolist() for each in found] == [[0, 3, 5], [1, 4, 6]]
 
 
 # --- what is a cause --------------------------------------------------------------------------------------------------
@@ -233,8 +239,8 @@ def test_what_is_beside_explains_nothing_else(columns: Numbers, nominal: Numbers
     alone = selection_of(target, nominal, values, made)
     found = {each.effect: alone.gain(each)[0] for each in alone.ranked()}
     assert found["backlash"] > found["presliding"] > 3 * LEAST_GAIN
-    refused = [each for each in alone.causes if each.effect == "backlash"]
-    beside = Selection(alone.grams, alone.causes, UNSEEN, refused)
+    refused = [each for each in alone.candidates if each.effect == "backlash"]
+    beside = Selection(alone.grams, alone.candidates, UNSEEN, refused)
     assert beside.base.sum() == pytest.approx(alone.ranked()[0].unseen.sum(), rel=1e-6)
     best = beside.best(LEAST_GAIN)
     assert best is not None and best.effect == "gravity"
@@ -272,8 +278,8 @@ def test_places_that_differ_little_are_near(columns: Numbers, nominal: Numbers) 
     made = [Made("moment_arm_variation", 1, tendon) for tendon in (1, 2, 3)]
     selection = selection_of(noise(11) + 0.5 * values[:, :, 0], nominal, values, made)
     best = selection.refined("moment_arm_variation")
-    assert best.tendon == 1
-    assert [each.tendon for each in selection.near(best)] == [2]
+    assert best.where.tendon == 1
+    assert [each.where.tendon for each in selection.near(best)] == [2]
 
 
 # --- gains ------------------------------------------------------------------------------------------------------------

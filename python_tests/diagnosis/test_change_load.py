@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from repetitions import repeated
 from synthetic_series import make_series
-from tendonfmu.diagnosis.change_diagnosis import steady_load
 from tendonfmu.diagnosis.diagnosis import diagnose
 from tendonfmu.diagnosis.names import reported_causes
+from tendonfmu.diagnosis.reference import steady_load
 from tendonfmu.diagnosis.result import Diagnosis, SteadyLoad
 from tendonfmu.diagnosis.samples import Series
 from worn_finger import WELL, How, finger, record, recording

@@ -12,9 +12,18 @@ import pytest
 
 from fit_cases import small_finger
 from random_fingers import random_extended, random_finger
-from tendonfmu.diagnosis.candidate_columns import Number, estimator_of, number_hypotheses, numbers_of, with_numbers
-from tendonfmu.diagnosis.effects.candidate import data_number
-from tendonfmu.diagnosis.result import EVERYWHERE, HERE, SOMEWHERE, Cause
+from tendonfmu.diagnosis.candidate_columns import (
+    EVERYWHERE,
+    HERE,
+    SOMEWHERE,
+    Candidate,
+    Number,
+    estimator_of,
+    number_hypotheses,
+    numbers_of,
+    with_numbers,
+)
+from tendonfmu.diagnosis.effects.mechanism import data_number
 from tendonfmu.report.diagnosis_types import EFFECTS
 from worn_finger import described
 
@@ -63,11 +72,11 @@ def test_every_number_can_have_with_numbers(seed: int) -> None:
     numbers = numbers_of(description(seed))
     first = 7
     found = number_hypotheses(numbers, first + len(numbers), first)
-    assert [each.direction.level for each in found] == sorted(each.direction.level for each in found)
+    assert [each.level for each in found] == sorted(each.level for each in found)
     covered = np.zeros(len(numbers), dtype=bool)
     for each in found:
         assert each.effect in HIDDEN and not each.terms
-        own = each.direction
+        own = each
         assert not own.mix[:first].any() and own.mix[first:].any(axis=0).all()
         assert (own.low <= 0.0).all() and (own.high >= 0.0).all()
         covered |= own.mix[first:].any(axis=1)
@@ -81,20 +90,20 @@ def test_every_number_can_have_with_numbers(seed: int) -> None:
     assert covered.all()
 
 
-def by_key(data: Description) -> dict[tuple[str, int | None, int | None], Cause]:
+def by_key(data: Description) -> dict[tuple[str, int | None, int | None], Candidate]:
     numbers = numbers_of(data)
     return {astuple(each.where): each for each in number_hypotheses(numbers, len(numbers), 0)}
 
 
 def test_places_of_one_effect_can_have_changed_together() -> None:
     found = by_key(described())
-    levels = {key: each.direction.level for key, each in found.items() if key[0] == "edge_friction"}
+    levels = {key: each.level for key, each in found.items() if key[0] == "edge_friction"}
     assert levels == {
         ("edge_friction", None, None): EVERYWHERE,
         ("edge_friction", 1, 1): HERE,
         ("edge_friction", 1, 2): HERE,
     }
-    levels = {key: each.direction.level for key, each in by_key(small_finger()).items() if key[0] == "edge_friction"}
+    levels = {key: each.level for key, each in by_key(small_finger()).items() if key[0] == "edge_friction"}
     assert levels[("edge_friction", None, None)] == EVERYWHERE
     assert {key[1:] for key, level in levels.items() if level == SOMEWHERE} == {
         (1, None),
@@ -109,7 +118,7 @@ def test_both_sides_of_a_law_change_alike_or_against_each_other() -> None:
     data = described(friction=friction)
     numbers = numbers_of(data)
     found = by_key(data)
-    same, against = (found[(effect, 1, None)].direction for effect in ("joint_friction", "asymmetric_friction"))
+    same, against = (found[(effect, 1, None)] for effect in ("joint_friction", "asymmetric_friction"))
     own = {each.path: each for each in numbers if each.effect == "joint_friction"}
     for path, number in own.items():
         assert same.mix[number.index, 0] == pytest.approx(number.value), path

@@ -23,10 +23,10 @@ from tendonfmu.diagnosis.diagnosis import PHASES
 from tendonfmu.diagnosis.effects import Place, Term, Where, by_name
 from tendonfmu.diagnosis.extension_diagnosis import merged
 from tendonfmu.diagnosis.extension_fit import FitSettings, FittedModel
-from tendonfmu.diagnosis.result import Cause, with_error
+from tendonfmu.diagnosis.result import with_error
 from tendonfmu.diagnosis.samples import Samples, as_described, corrected_arms, predicted_forces
 from tendonfmu.diagnosis.search import ExtensionSearch, Trial, search
-from tendonfmu.diagnosis.selection import LeastSizes, least_sizes
+from tendonfmu.diagnosis.selection import Judged, LeastSizes, least_sizes
 from tendonfmu.model.description import Finger
 from tendonfmu.model.native import Instance
 from tendonfmu.recordings.prepared import FitRecording, Held, prepare
@@ -187,7 +187,7 @@ def test_a_search_starts_with_the_memory_that_there_is() -> None:
     distance = 0.4  # s times the thresholds: 0.2 mm
     truth = finger() | {"extensions": [{"effect": "presliding", "displacement": distance}]}
     base = found_base(truth, 25, 3)
-    assert "presliding" in {terms[0].candidate.name for terms in base.start}
+    assert "presliding" in {terms[0].mechanism.name for terms in base.start}
     left = [np.sum(base.samples.residual(model.data) ** 2) for model in (base.nominal, base.model)]
     assert left[1] < 0.5 * left[0]
 
@@ -195,7 +195,7 @@ def test_a_search_starts_with_the_memory_that_there_is() -> None:
 def test_position_dependent_torque_comes_first(hidden: FitRecording) -> None:
     base = find_base(described(finger()), [hidden], FitSettings(threads=1), 0.03)
     first = base.start[0][0]
-    assert (first.candidate.name, first.place.joint) in [("cover_stiffness", 2), ("gravity", 2)]
+    assert (first.mechanism.name, first.place.joint) in [("cover_stiffness", 2), ("gravity", 2)]
 
 
 def test_negative_friction_is_no_cause() -> None:
@@ -222,13 +222,13 @@ def test_least_sizes_follow_the_sensors(sound: FitRecording) -> None:
 # --- causes -----------------------------------------------------------------------------------------------------------
 
 
-def named(effect: str, place: Place, p_value: float, *others: str) -> Cause:
-    return Cause(
+def named(effect: str, place: Place, p_value: float, *others: str) -> Judged:
+    return Judged(
         Where(effect, place.joint, place.tendon),
         p_value=p_value,
         gain=with_error(0.1, 0.01),
         terms=(Term(by_name(effect), place, {}, (1.0,)),),
-        alike=tuple(Cause(Where(each, 1)) for each in others),
+        alike=tuple(Judged(Where(each, 1)) for each in others),
     )
 
 
@@ -259,9 +259,9 @@ def test_a_hidden_spring_is_found_and_fitted(hidden: FitRecording) -> None:
     assert Where("cover_stiffness", 2) in [first.where, *(each.where for each in first.alike)]
     assert len(found.causes) <= 2
     if first.effect == "cover_stiffness":
-        assert found.extended.data["joints"][1]["cover"]["stiffness"] == pytest.approx(0.02, rel=0.2)
-    used = found.last.series.used
-    assert np.mean(found.last.residual[used] ** 2) < np.mean(found.first.residual[used] ** 2)
+        assert found.model.data["joints"][1]["cover"]["stiffness"] == pytest.approx(0.02, rel=0.2)
+    used = found.view.series.used
+    assert np.mean(found.view.residual[used] ** 2) < np.mean(found.first.residual[used] ** 2)
     assert "causes" in seen and "contact" in seen
 
 

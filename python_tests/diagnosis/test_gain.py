@@ -20,7 +20,7 @@ from fit_data import make_recording, wavy_forces, wavy_motion
 from repository_paths import ROOT
 from tendonfmu.diagnosis.change_search import gain_of, interval_of
 from tendonfmu.diagnosis.contact_scan import detection_gain
-from tendonfmu.diagnosis.effects import CANDIDATES, Place, Term
+from tendonfmu.diagnosis.effects import MECHANISMS, Place, Term
 from tendonfmu.diagnosis.extension_fit import (
     FitSettings,
     cause_parameters,
@@ -67,7 +67,7 @@ def prepared(truth: dict[str, Any], seed: int, holdout: float = 0.0, seconds: fl
 
 
 def accepted(name: str, place: Place, magnitudes: list[float], **shape: float) -> Term:
-    candidate = next(each for each in CANDIDATES if each.name == name)
+    candidate = next(each for each in MECHANISMS if each.name == name)
     return Term(candidate, place, shape, magnitudes)
 
 
@@ -160,13 +160,13 @@ def test_a_hidden_effect_is_fitted_and_its_gain_is_true() -> None:
     unseen = Unseen(before.data, [training], [test])
     gains = [unseen.gain(each, found.data, 0) for each in without]
     assert gains[0].low > 0.1 and gains[1].high < 0.05
-    assert result.value.value > 0.0 and not result.held_out
+    assert result.gain.value > 0.0 and not result.held_out
     first, _, last = result.steps
-    assert 1 - last / first == pytest.approx(result.value.value)
+    assert 1 - last / first == pytest.approx(result.gain.value)
     assert result.steps[1] == pytest.approx(last, rel=0.05)
     assert all(a < b for a, b in zip(result.extended.test_rms, result.bias_only_rms, strict=True))
     blocks = measure_gain(before.data, found.data, [prepared(truth, 1, holdout=0.3)])
-    assert blocks.held_out and blocks.value.low > 0
+    assert blocks.held_out and blocks.gain.low > 0
 
 
 def test_a_bias_does_not_hide_what_is_slow() -> None:

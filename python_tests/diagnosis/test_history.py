@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from html import unescape
 from pathlib import Path
 from typing import Any
@@ -100,26 +101,17 @@ def answering(monkeypatch: pytest.MonkeyPatch) -> Calls:
             raise InputError(f"{recording}: no column; expected some")
         far = float(text) > 1.25
         keys = [["joint_friction", 1, None]] if far else []
-        return {
-            "recording": recording,
-            "verdict": "explained" if far else "adequate",
-            "keys": json.dumps(keys),
-            "gains": json.dumps({json.dumps(key): 0.4 for key in keys}),
-            "titles": json.dumps({json.dumps(key): "friction in the joint" for key in keys}),
-        }
+        causes = [{"where": key, "title": "friction in the joint", "gain": 0.4} for key in keys]
+        return {"recording": recording, "verdict": "explained" if far else "adequate", "causes": causes}
 
     def sizes(*options: Any) -> dict[str, Any]:
         recording, keys = options[-2:]
         asked.append(("sizes", Path(recording).name))
         now = float(Path(recording).read_text())
-        entry = {
-            "number": "coulomb",
-            "unit": "N.m",
-            "reference": [1.0, 1.0, 1.0],
-            "now": [now, now - 0.02, now + 0.02],
-            "change": [now - 1.0, now - 1.02, now - 0.98],
-        }
-        return {"recording": recording, "sizes": json.dumps({json.dumps(key): entry for key in json.loads(keys)})}
+        size = ChangedSize(
+            "coulomb", "N.m", *(Interval(value, value - 0.02, value + 0.02) for value in (1.0, now, now - 1.0))
+        )
+        return {"recording": recording, "sizes": json.dumps([{"where": key, **asdict(size)} for key in keys])}
 
     monkeypatch.setattr(change_history, "named_in", named)
     monkeypatch.setattr(change_history, "sizes_in", sizes)

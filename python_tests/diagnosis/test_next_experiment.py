@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tendonfmu.diagnosis.effects import CANDIDATES, Place, Term
-from tendonfmu.diagnosis.experiments.menu import (
+from tendonfmu.diagnosis.effects import MECHANISMS, Place, Term
+from tendonfmu.diagnosis.extension_fit import FitSettings, extended_description, fit_numbers
+from tendonfmu.diagnosis.menu import (
     WIDER,
     Entry,
     Recorded,
@@ -22,9 +23,8 @@ from tendonfmu.diagnosis.experiments.menu import (
     motions,
     tensions,
 )
-from tendonfmu.diagnosis.experiments.motion import discriminating_motion, expected_recording, perform
-from tendonfmu.diagnosis.experiments.next_experiment import Experiments, Question, plan_experiments
-from tendonfmu.diagnosis.extension_fit import FitSettings, extended_description, fit_numbers
+from tendonfmu.diagnosis.motion import discriminating_motion, expected_recording, perform
+from tendonfmu.diagnosis.next_experiment import Experiments, Question, plan_experiments
 from tendonfmu.diagnosis.samples import Samples, exact_model
 from tendonfmu.errors import InputError
 from tendonfmu.files.json_node import Node
@@ -68,7 +68,7 @@ def recording_of(data: dict[str, Any], entry: Entry, seed: int = 0, noise: float
 
 
 def accepted(name: str, place: Place, magnitudes: tuple[float, ...] = ()) -> Term:
-    return Term(next(each for each in CANDIDATES if each.name == name), place, {}, magnitudes)
+    return Term(next(each for each in MECHANISMS if each.name == name), place, {}, magnitudes)
 
 
 JOINT, LOAD = accepted("joint_friction", Place(2), (0.004, 0.0)), accepted("joint_load_friction", Place(2), (1e-4, 0.0))
@@ -90,7 +90,7 @@ def test_load_and_plain_friction_are_told_by_the_pretension(planned: Experiments
     assert answer.distance > 3 * answer.now and answer.distance > 0.33
     assert planned.best.separates and planned.best.separates[0][0].effect == "joint_friction"
     assert planned.sentence(0) == answer.entry.sentence and answer.entry.tension in planned.sentence(0)
-    assert all(name in planned.best.sentence for name in (JOINT.candidate.title, LOAD.candidate.title, "joint 2 (tip)"))
+    assert all(name in planned.best.sentence for name in (JOINT.mechanism.title, LOAD.mechanism.title, "joint 2 (tip)"))
     gain = planned.answers[1]
     assert gain.separates and (gain.entry.tension or gain.entry.load) and gain.distance > 2 * gain.now
 

@@ -12,7 +12,7 @@ import typer
 from optional_parts import require
 from repository_paths import ROOT
 from tendonfmu.commands.program import app
-from tendonfmu.diagnosis.effects.table import CANDIDATES
+from tendonfmu.diagnosis.effects.table import MECHANISMS
 
 SOURCES = re.compile(r"^(runtime|fmu_src|python)/.*\.(c|h|cpp|hpp|py|json)$")
 CITED = re.compile(r"(docs/[\w/]+\.md)(?:#([\w-]+))?")
@@ -58,4 +58,4 @@ def test_every_option_and_every_effect_is_in_the_reference() -> None:
     options = {option for command in commands.values() for each in command.params for option in each.opts}
     named = set(re.findall(r"(?<![\w-])--?[a-z][\w-]*", pages))
     assert {option for option in options if option.startswith("-")} - named == set()
-    assert [each.name for each in CANDIDATES if f"| `{each.name}` | {each.title} |" not in pages] == []
+    assert [each.name for each in MECHANISMS if f"| `{each.name}` | {each.title} |" not in pages] == []

@@ -12,9 +12,9 @@ import jsonschema
 import pytest
 
 import diagnosis_examples as examples
-from tendonfmu.diagnosis.names import reported_causes, title_of
+from tendonfmu.diagnosis.effects import title_of
+from tendonfmu.diagnosis.names import reported_causes, size_of
 from tendonfmu.diagnosis.result import CausePlace, Diagnosis, ModelErrors
-from tendonfmu.diagnosis.sizes import size_of
 from tendonfmu.files import report_text
 from tendonfmu.report.diagnosis_files import build_report
 from tendonfmu.report.diagnosis_text import left_of, left_sentence, lines, tables, unit_of

@@ -16,8 +16,8 @@ import pytest
 import diagnosis_examples as examples
 from real_browser import Elements, figures_of, measure, needs_nothing_else
 from repetitions import repeated
-from tendonfmu.diagnosis.effects import Where
-from tendonfmu.diagnosis.names import reported_causes, title_of
+from tendonfmu.diagnosis.effects import Where, title_of
+from tendonfmu.diagnosis.names import reported_causes
 from tendonfmu.diagnosis.result import Diagnosis, RemainderMap
 from tendonfmu.estimate.fit_report import FitPicture
 from tendonfmu.report.diagnosis_page import diagnosis_page, waterfall_of

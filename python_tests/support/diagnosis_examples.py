@@ -107,7 +107,6 @@ GRAVITY = Cause(
     p_value=2.1e-7,
     gain=Interval(0.31, 0.27, 0.35),
     confusable_with=(Where("cover_stiffness", joint=2), Where("moment_arm", joint=2, tendon=1)),
-    parameters={"extensions[1].sine": (0.0121, "N.m"), "extensions[1].cosine": (-0.0034, "N.m")},
     places=(CausePlace(2, None, {"extensions[1].sine": (0.0121, "N.m"), "extensions[1].cosine": (-0.0034, "N.m")}),),
     size="12.6 mN·m at most",
     evidence=(evidence(2, "angle of joint 2", "rad", (-0.4, 0.9), lambda q: 0.0121 * np.sin(q) - 0.0034 * np.cos(q)),),
@@ -120,7 +119,6 @@ LOAD_FRICTION = Cause(
     p_value=3.4e-5,
     gain=Interval(0.14, 0.11, 0.17),
     confusable_with=(),
-    parameters={"extensions[2].coulomb": (2.3e-4, "m"), "extensions[3].coulomb": (1.1e-4, "m")},
     intervals={"extensions[2].coulomb": Interval(2.3e-4, 2.0e-4, 2.6e-4)},
     places=(
         CausePlace(1, 3, {"extensions[2].coulomb": (2.3e-4, "m")}),
@@ -137,7 +135,6 @@ DRIFT = Cause(
     p_value=8.0e-3,
     gain=Interval(0.031, 0.012, 0.052),
     confusable_with=(Where("force_gain", tendon=2), Where("asymmetric_friction", joint=1)),
-    parameters={"extensions[4].amplitude": (-0.18, "1"), "extensions[4].time_constant": (22.0, "s")},
     places=(
         CausePlace(None, None, {"extensions[4].amplitude": (-0.18, "1"), "extensions[4].time_constant": (22.0, "s")}),
     ),
@@ -152,7 +149,6 @@ SMALL = Cause(
     p_value=4.0e-4,
     gain=Interval(0.011, 0.004, 0.018),
     confusable_with=(),
-    parameters={},
     size="",
     places=(CausePlace(2, None, {}),),
 )
@@ -346,7 +342,6 @@ def changed() -> Diagnosis:
         title="friction of a tendon on its pulley",
         explanation="The tendon rubs on the pulley of this joint.",
         gain=Interval(0.42, 0.38, 0.46),
-        parameters={path: (0.036, "1")},
         places=(CausePlace(1, 1, {path: (0.036, "1")}),),
         size="+20 %: 3 % then, 3.6 % now",
         evidence=tuple(_with_reference(each) for each in GRAVITY.evidence),

@@ -13,6 +13,7 @@ from scipy.signal import lfilter
 from synthetic_series import bias_splines
 from tendonfmu.diagnosis.candidate_columns import CandidateColumns, Proposal
 from tendonfmu.diagnosis.effects import Column, Place, Variant, by_name
+from tendonfmu.diagnosis.effects.mechanism import SECANT
 from tendonfmu.diagnosis.samples import Series
 from tendonfmu.diagnosis.selection import LeastSizes
 from tendonfmu.statistics.block_grams import Grams, Products
@@ -91,7 +92,7 @@ def candidate_columns(values: Array, made: Sequence[Made]) -> CandidateColumns:
         for shape in each.shapes:
             expected = tuple(each.expected) * (each.size if len(each.expected) == 1 else 1)
             columns = tuple(Column({"": 1.0}, each.sign, size) for size in expected)
-            variant = Variant({}, shape, full=lambda factor: {}) if each.secant else Variant({}, shape, columns)
+            variant = Variant({}, shape, SECANT, full=lambda factor: {}) if each.secant else Variant({}, shape, columns)
             place = Place(each.joint, each.tendon)
             proposals.append(Proposal(by_name(each.effect), place, variant, slice(first, first + each.size)))
             first += each.size

@@ -2,12 +2,11 @@
 
 - `inputs` reads and checks recordings; `base` settles delay, position-dependent torque and memory.
 - `samples` is what runs of the core are compared with, and its signals; `view` turns both into columns.
-- `result` holds what the search names, from the candidate that is tried to the page.
-- `selection` judges candidates; `search` judges all corrections of sensors together and adds what a description
-  lacks, `change_search` finds what has changed since a reference.
-- `extension_fit` fits the extended finger; `gain` measures on unseen data.
-- `extension_diagnosis` and `change_diagnosis` confirm and report; `diagnosis` begins.
-- `experiments` finds what to record next; `effects` holds the table of effects.
+- A mechanism (`effects`) at a place is a candidate (`candidate_columns`), with gain and certainty it is judged
+  (`selection`), with its numbers a cause (`result`).
+- `search` adds what a description lacks, one cause after the other; `change_search` finds what has changed since a
+  reference. `extension_diagnosis` and `change_diagnosis` confirm and report; `diagnosis` begins.
+- `extension_fit` fits the extended finger; `gain` measures on unseen data; `next_experiment` finds what to record.
 """
 
 from typing import TYPE_CHECKING
@@ -17,13 +16,14 @@ from tendonfmu.lazy_exports import lazy_exports
 if TYPE_CHECKING:
     from .contact_scan import events_of, without_events
     from .diagnosis import diagnose
-    from .effects.candidate import Where
+    from .effects.mechanism import Where
     from .effects.places import thresholds
+    from .effects.table import CONTACT, UNKNOWN, ZERO, title_of
     from .effects.words import NBSP, quantity
-    from .experiments.motion import discriminating_motion
     from .extension_fit import FitSettings, with_known
     from .history import History, Line, diagnose_history, share_of
-    from .names import CONTACT, UNKNOWN, ZERO, Names, at_place, names_in, numbered, reported_causes, title_of
+    from .motion import discriminating_motion
+    from .names import Names, at_place, names_in, numbered, reported_causes, size_at
     from .result import (
         Cause,
         CausePlace,
@@ -38,6 +38,5 @@ if TYPE_CHECKING:
         Sensor,
     )
     from .samples import Samples
-    from .sizes import size_at
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -12,26 +12,24 @@ from numpy.typing import NDArray
 from scipy.signal import welch
 
 from tendonfmu.arrays import Flags, Numbers
-from tendonfmu.diagnosis.effects import BY_NAME, Place, Where
+from tendonfmu.diagnosis.effects import BY_NAME, Place, Where, title_of
 from tendonfmu.diagnosis.extension_fit import FitSettings
 from tendonfmu.diagnosis.gain import Gain
 from tendonfmu.diagnosis.inputs import Input
-from tendonfmu.diagnosis.result import Cause, CausePlace, Diagnosis, Evidence, ResidualView, Unexplained
+from tendonfmu.diagnosis.result import Cause, Diagnosis, Evidence, ResidualView, Unexplained
 from tendonfmu.diagnosis.samples import Series
-from tendonfmu.diagnosis.selection import SIGNIFICANCE
+from tendonfmu.diagnosis.selection import SIGNIFICANCE, Judged
 from tendonfmu.statistics import Interval, make_folds
 from tendonfmu.tasks import Phases
-
-# --- how the residual looks -------------------------------------------------------------------------------------------
-# From all sides is over time, angle, velocity, force, load and travel, and as spectrum and autocorrelation.
-
 
 BINS = 24
 SHOWN = 4.0  # ratio of the bins' squared means without and with the cause, for a picture that shows it
 FEWEST = 10  # blocks in a bin
 POINTS = 1200  # of a curve over time
 LONGEST_LAG = 1.0  # s
-
+MOST_LONGER = 10.0  # times the duration: beyond, another motion is the better advice
+MARGIN = 1.2  # times the duration at which the interval would just end at 0
+OTHER_MOTION = "repeat the test with another motion, at two pretensions"
 
 # --- a cause ----------------------------------------------------------------------------------------------------------
 
@@ -75,21 +73,21 @@ def _binned_evidence(compared: Compared, over: tuple[str, str, Numbers], joint: 
         return ()
     before, after = compared.before[:, joint], compared.after[:, joint]
     reference: tuple[Numbers, Numbers] | tuple[None, None] = (None, None)
+    least = 1 if compared.reference is None else FEWEST
     if compared.reference is None:
         order = np.flatnonzero(kept)[np.argsort(values[kept], kind="stable")]
         parts = np.array_split(order, bins)
     else:
         edges = np.quantile(values[kept], np.linspace(0.0, 1.0, bins + 1))
         inside = compared.reference & (values >= edges[0]) & (values <= edges[-1])
-        edges[0], edges[-1] = -np.inf, np.inf
-        member = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, bins - 1)
+        member = np.searchsorted(edges[1:-1], values, side="right")
         filled = [k for k in range(bins) if (kept & (member == k)).any()]
         parts = [np.flatnonzero(kept & (member == k)) for k in filled]
         reference = _means(after, [np.flatnonzero(inside & (member == k)) for k in filled], compared.series)
-    least = 1 if compared.reference is None else FEWEST
-    means = [_means(torque, parts, compared.series, least) for torque in (before, after)]
+    (before, before_std), (after, after_std) = (
+        _means(torque, parts, compared.series, least) for torque in (before, after)
+    )
     coordinate = np.array([values[rows].mean() for rows in parts])
-    (before, before_std), (after, after_std) = means
     return (Evidence(joint + 1, label, unit, coordinate, before, after, before_std, after_std, *reference),)
 
 
@@ -103,8 +101,7 @@ def _means(
         if len(rows) >= least:
             means[k] = values[rows].mean()
             _, member = np.unique(second[rows], return_inverse=True)
-            sums = np.bincount(member, weights=values[rows] - means[k])
-            errors[k] = np.sqrt(np.sum(sums**2)) / len(rows)
+            errors[k] = np.sqrt(np.sum(np.bincount(member, weights=values[rows] - means[k]) ** 2)) / len(rows)
     return means, errors
 
 
@@ -161,8 +158,7 @@ def _over_time(series: Series, before: Numbers, after: Numbers, joint: int) -> R
     """Average over equal pieces, recordings one after another; NaN between them and where nothing is used."""
     size = max(1, -(-len(before) // POINTS))
     pieces = -(-len(before) // size)
-    piece = np.arange(len(before)) // size
-    used = series.used
+    piece, used = np.arange(len(before)) // size, series.used
     count = np.bincount(piece[used], minlength=pieces)
 
     def mean(values: Numbers) -> Numbers:
@@ -185,27 +181,21 @@ def _running_time(series: Series) -> Numbers:
 
 def _binned(kind: str, label: str, unit: str, x: Numbers, before: Numbers, after: Numbers, joint: int) -> ResidualView:
     """Average over bins of equal count; `before_std` is the scatter within the bin."""
-    order = np.argsort(x, kind="stable")
-    parts = [part for part in np.array_split(order, BINS) if len(part)]
-
-    def mean(values: Numbers) -> Numbers:
-        return np.array([values[part].mean() for part in parts])
-
+    parts = [part for part in np.array_split(np.argsort(x, kind="stable"), BINS) if len(part)]
+    at, one, other = (np.array([values[part].mean() for part in parts]) for values in (x, before, after))
     scatter = np.array([before[part].std() for part in parts])
-    return ResidualView(joint + 1, kind, label, unit, mean(x), mean(before), mean(after), scatter)
+    return ResidualView(joint + 1, kind, label, unit, at, one, other, scatter)
 
 
 def _spectrum(series: Series, before: Numbers, after: Numbers, joint: int) -> ResidualView:
     """Return Welch's power density, N²m²/Hz; runs without a gap are averaged by their length."""
     rate, plan = 1.0 / series.step, make_folds(series)
-    ends = np.flatnonzero(np.diff(plan.run, append=-1)) + 1
-    runs = [plan.rows[begin:end] for begin, end in zip(np.append(0, ends[:-1]), ends, strict=True)]
-    size = min(512, max((len(run) for run in runs), default=1))
+    runs = np.split(plan.rows, np.flatnonzero(np.diff(plan.run)) + 1)
+    size = min(512, max(map(len, runs)) or 1)
     total, weight = np.zeros((2, size // 2 + 1)), 0.0
     for run in runs:
         if len(run) >= size:
-            density = welch(np.stack([before[run], after[run]]), rate, nperseg=size)[1]
-            total += density * len(run)
+            total += welch(np.stack([before[run], after[run]]), rate, nperseg=size)[1] * len(run)
             weight += len(run)
     frequency = np.arange(size // 2 + 1, dtype=np.float64) / (size * series.step)
     total /= max(weight, 1.0)
@@ -215,7 +205,7 @@ def _spectrum(series: Series, before: Numbers, after: Numbers, joint: int) -> Re
 def _autocorrelation(series: Series, before: Numbers, after: Numbers, joint: int) -> ResidualView:
     lags = np.arange(1, max(2, round(LONGEST_LAG / series.step)) + 1)
     curves = [_correlations(series, values, lags) for values in (before, after)]
-    return ResidualView(joint + 1, "autocorrelation", "lag", "s", np.asarray(lags * series.step), curves[0], curves[1])
+    return ResidualView(joint + 1, "autocorrelation", "lag", "s", np.asarray(lags * series.step), *curves)
 
 
 def _correlations(series: Series, values: Numbers, lags: NDArray[np.int64]) -> Numbers:
@@ -223,27 +213,24 @@ def _correlations(series: Series, values: Numbers, lags: NDArray[np.int64]) -> N
     plan = make_folds(series)
     seen = values[plan.rows] - (values[plan.rows].mean() if len(plan.rows) else 0.0)
     variance = float(np.mean(seen**2)) if len(seen) else 0.0
-    correlations = []
-    for lag in lags:
+    correlations = np.zeros(len(lags))
+    for k, lag in enumerate(lags):
         same = plan.run[lag:] == plan.run[:-lag]
-        count = int(same.sum())
-        mean = float(np.sum((seen[lag:] * seen[:-lag])[same])) / count if count else 0.0
-        correlations.append(mean / variance if variance > 0.0 else 0.0)
-    return np.array(correlations)
+        if same.any() and variance > 0.0:
+            correlations[k] = float(np.sum((seen[lag:] * seen[:-lag])[same])) / int(same.sum()) / variance
+    return correlations
 
 
 def whiteness(series: Series, before: Numbers, after: Numbers) -> tuple[tuple[float, float], ...]:
     """Return, for each joint, the correlation of neighbouring blocks before and after; 0 for white noise."""
-    one = np.array([1])
-    return tuple(
-        (float(_correlations(series, before[:, j], one)[0]), float(_correlations(series, after[:, j], one)[0]))
-        for j in range(before.shape[1])
-    )
+
+    def of(values: Numbers) -> float:
+        return float(_correlations(series, values, np.array([1]))[0])
+
+    return tuple((of(one), of(other)) for one, other in zip(before.T, after.T, strict=True))
 
 
-MOST_LONGER = 10.0  # times the duration: beyond, another motion is the better advice
-MARGIN = 1.2  # times the duration at which the interval would just end at 0
-OTHER_MOTION = "repeat the test with another motion, at two pretensions"
+# --- the answer -------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -277,21 +264,15 @@ def answered(
         recordings=tuple(str(recording.path) for recording in given.training),
         tests=tuple(str(recording.path) for recording in given.tests),
         references=tuple(str(recording.path) for recording in given.reference),
-        held_out=gain.held_out,
         seconds=0.0,
         seed=asked.seed,
         least_gain=asked.least_gain,
-        nominal=gain.nominal,
-        extended=gain.extended,
-        bias_only_rms=gain.bias_only_rms,
-        delivered=gain.delivered,
-        gain=gain.value,
-        steps=gain.steps,
         causes=tuple(causes),
         unexplained=unexplained,
         views=residual_views(*compared, load=load_at_joints),
         whiteness=whiteness(*compared),
         warnings=(*given.warnings, *warnings),
+        **vars(gain),
         **others,
     )
 
@@ -302,14 +283,26 @@ def _verdict(explained: bool, unknown: bool) -> str:
     return "unexplained" if unknown else "adequate"
 
 
-def reported(cause: Cause, compared: Compared) -> Cause:
-    """Return a cause with all its numbers, its rivals and its picture."""
-    return replace(
-        cause,
-        parameters={path: number for place in cause.places for path, number in place.parameters.items()},
-        confusable_with=tuple(other.where for other in cause.alike),
-        evidence=evidence(cause.effect, [Place(place.joint, place.tendon) for place in _places(cause)], compared),
-    )
+def cause_of(found: Judged, **numbers: Any) -> Cause:
+    """Return a cause with its words and its rivals; `numbers` are further fields of `Cause`."""
+    effect, rivals = found.effect, tuple(other.where for other in found.alike)
+    known: dict[str, Any] = {"gain": found.gain, "confusable_with": rivals, "sensors": found.sensors} | numbers
+    return Cause(found.where, title_of(effect), _explanation(found), found.p_value, **known)
+
+
+def _explanation(found: Judged) -> str:
+    """Say what the effect is; a number that the description has is different now."""
+    if found.effect not in BY_NAME or found.terms:
+        return BY_NAME[found.effect].explanation if found.terms else ""
+    _, look, at = BY_NAME[found.effect].explanation.partition("Look ")
+    return f"The description has this effect; its number is different now. {look}{at}".strip()
+
+
+def reported(found: Judged, compared: Compared, **numbers: Any) -> Cause:
+    """Return a cause with its picture."""
+    # a change is free at all of its places together
+    places = [found.where.place] if compared.reference is not None else [term.place for term in found.terms]
+    return cause_of(found, **numbers, evidence=evidence(found.effect, places or [found.where.place], compared))
 
 
 def not_taken(causes: Iterable[Cause], experiments: Mapping[Where, str], seconds: float) -> dict[str, Any]:
@@ -317,7 +310,6 @@ def not_taken(causes: Iterable[Cause], experiments: Mapping[Where, str], seconds
     # `experiments` names those planned; `seconds` of unseen motion were judged
     small, uncertain = list[Cause](), list[Cause]()
     for cause in causes:
-        cause = replace(cause, places=_places(cause), confusable_with=tuple(other.where for other in cause.alike))
         if cause.gain.low > 0.0 or cause.p_value >= SIGNIFICANCE:
             small.append(cause)
         else:
@@ -333,10 +325,3 @@ def _longer(gain: Interval, seconds: float) -> str:
         return ""
     needed = 10.0 * math.ceil(MARGIN * factor * seconds / 10.0)
     return f"test on {needed:.0f} s of such motion, in place of {seconds:.0f} s"
-
-
-def _places(cause: Cause) -> tuple[CausePlace, ...]:
-    """Return the places of the terms of a cause, without numbers; a change is free at all of its places together."""
-    if cause.changed is not None or not cause.terms:
-        return (CausePlace(cause.joint, cause.tendon, {}),)
-    return tuple(CausePlace(*term.place, {}) for term in cause.terms)

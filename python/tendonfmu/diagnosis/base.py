@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.arrays import Data, Flags, Numbers
-from tendonfmu.diagnosis.effects import CANDIDATES, Candidate, Place, Term, Where, by_name
+from tendonfmu.diagnosis.effects import MECHANISMS, Mechanism, Place, Term, Where, by_name
 from tendonfmu.diagnosis.extension_fit import (
     FitSettings,
     FittedModel,
@@ -27,7 +27,7 @@ from tendonfmu.diagnosis.extension_fit import (
     memory_terms,
 )
 from tendonfmu.diagnosis.samples import Samples, shifted
-from tendonfmu.diagnosis.selection import LeastSizes, Selection, least_sizes
+from tendonfmu.diagnosis.selection import Judged, LeastSizes, least_sizes
 from tendonfmu.diagnosis.view import View, look
 from tendonfmu.estimate import choose_memory
 from tendonfmu.model import EFFECT_NUMBERS, Finger, moment_arms
@@ -53,9 +53,9 @@ class Base:
     model: FittedModel  # fitted with `start`
     settings: FitSettings
 
-    def look(self, model: FittedModel, candidates: Sequence[Candidate] = CANDIDATES) -> View:
+    def look(self, model: FittedModel, mechanisms: Sequence[Mechanism] = MECHANISMS) -> View:
         """Return what a model that was fitted to the samples lacks."""
-        return look(model.data, self.samples, self.least, candidates, model).as_described
+        return look(model.data, self.samples, self.least, mechanisms, model).as_described
 
     def left_unseen(self, model: FittedModel) -> Numbers:
         """Return Σ e² of a model on unseen stretches, (N·m)² [K]."""
@@ -96,14 +96,8 @@ def _digest(given: Finger, recordings: Sequence[FitRecording], settings: FitSett
     known = hashlib.sha256(json.dumps([given.data, str(settings), least_gain]).encode())
     for recording in recordings:
         known.update(f"{recording.kinematics} {recording.parts}".encode())
-        groups = recording.recording.groups
-        for values in (
-            recording.time,
-            recording.target,
-            recording.train,
-            recording.silent,
-            *(groups[name] for name in sorted(groups)),
-        ):
+        groups = [values for _, values in sorted(recording.recording.groups.items())]
+        for values in (recording.time, recording.target, recording.train, recording.silent, *groups):
             known.update(values.tobytes())
     return known.hexdigest()
 
@@ -131,12 +125,8 @@ def _found_base(given: Finger, recordings: Sequence[FitRecording], settings: Fit
 def _position_dependent(data: Data, samples: Samples, least: LeastSizes, least_gain: float) -> list[tuple[Term, ...]]:
     """Return the terms of effects that depend on angles alone, one effect after the other."""
     view = look(data, samples, least, [by_name(name) for name in POSITION])
-    taken: list[Any] = []
-    while len(taken) < len(POSITION):
-        selection: Selection = view.beside({cause.where for cause in taken})
-        best = selection.best(least_gain)
-        if best is None:
-            break
+    taken: list[Judged] = []
+    while best := view.beside({cause.where for cause in taken}).best(least_gain):
         taken.append(best)
     return [cause.scaled() for cause in taken]
 
@@ -168,8 +158,11 @@ def _delay_of_torque(model: FittedModel, samples: Samples, least: LeastSizes) ->
     """Return a delay of forces that is too large for its derivative, beside a fitted model; () if there is none."""
     if not DELAY.places(model.data, samples.recordings[0].kinematics):
         return ()
-    delays = _delays(float(np.median(np.diff(samples.recordings[0].time))))
-    moved = np.stack([_late_torque(samples, delay) for delay in delays], axis=2)
+    # a grid of all delays that a description accepts, including 0
+    grid = max(2 * FINE, float(np.median(np.diff(samples.recordings[0].time))) / 2)
+    delays = grid * np.arange(-int(LONGEST_DELAY / grid), int(LONGEST_DELAY / grid) + 1)
+    late = ([shifted(each, each.target, delay) - each.target for each in samples.recordings] for delay in delays)
+    moved = np.stack([samples.grid.means(changes) for changes in late], axis=2)
     view = look(model.data, samples, least, (), model)
     errors = view.grams.errors_of(view.series.target[:, :, None] + moved)
     still, best = int(np.argmin(np.abs(delays))), int(np.argmin(errors))
@@ -189,13 +182,6 @@ def _delay_of_positions(data: Data, samples: Samples, least: LeastSizes) -> tupl
 
 def _late(delay: float) -> tuple[Term, ...]:
     return (Term(DELAY, Place(), {"delay": delay}, (1.0,)),)
-
-
-def _delays(step: float) -> Numbers:
-    """Return a grid of all delays that a description accepts, including 0."""
-    grid = max(2 * FINE, step / 2)
-    count = int(LONGEST_DELAY / grid)
-    return np.asarray(grid * np.arange(-count, count + 1), dtype=np.float64)
 
 
 def delay_of_positions(data: Mapping[str, Any], recordings: Sequence[FitRecording]) -> float | None:
@@ -226,8 +212,3 @@ def delay_of_positions(data: Mapping[str, Any], recordings: Sequence[FitRecordin
         return None
     before, at, after = errors[best - 1 : best + 2]
     return float(delays[best] + FINE * 0.5 * (before - after) / max(before - 2 * at + after, 1e-300))
-
-
-def _late_torque(samples: Samples, delay: float) -> Numbers:
-    """Return the change of the block means of the target if it is taken `delay` s later, N·m [B, n]."""
-    return samples.grid.means([shifted(each, each.target, delay) - each.target for each in samples.recordings])

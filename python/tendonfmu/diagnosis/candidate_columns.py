@@ -8,23 +8,23 @@ description's own numbers are differences, too. All are averaged over blocks of 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.arrays import Data, Numbers
-from tendonfmu.diagnosis.effects import BY_NAME, CANDIDATES, SHARED, Candidate, Place, Term, Variant, Where
+from tendonfmu.diagnosis.effects import MECHANISMS, SHARED, Mechanism, Place, Term, Variant, Where
 from tendonfmu.diagnosis.extension_fit import structure_of
-from tendonfmu.diagnosis.result import EVERYWHERE, HERE, SOMEWHERE, Cause, Direction
 from tendonfmu.diagnosis.samples import Samples, Span, span_of, with_late_forces
 from tendonfmu.errors import TooLargeError
-from tendonfmu.estimate import SCALING, Estimator, Unknown, own_copy, set_number
+from tendonfmu.estimate import SCALING, Estimator, own_copy, set_number
 from tendonfmu.model import law_path, native, steps_of
 
 Single = NDArray[np.float32]
-Worth = Callable[[Candidate, Place, Mapping[str, float]], bool]
+Worth = Callable[[Mechanism, Place, Mapping[str, float]], bool]
 
 _LARGEST = 1e9  # largest non-linear number in any unit: docs/reference/semantics/effects.md
 _MOST_MEMORY = 8.0  # GB, for all columns
@@ -32,9 +32,9 @@ _MOST_MEMORY = 8.0  # GB, for all columns
 
 @dataclass(frozen=True)
 class Proposal:
-    """A candidate at a place and one point of its grid."""
+    """A mechanism at a place and one point of its grid."""
 
-    candidate: Candidate
+    mechanism: Mechanism
     place: Place
     variant: Variant
     columns: slice  # where its columns are in `CandidateColumns.values`
@@ -52,16 +52,21 @@ def candidate_columns(
     data: Data,
     samples: Samples,
     *,
-    candidates: Sequence[Candidate] = CANDIDATES,
+    mechanisms: Sequence[Mechanism] = MECHANISMS,
     span: Span | None = None,
     worth: Worth | None = None,
 ) -> CandidateColumns:
-    """Compute the columns of all candidates that a description lacks."""
+    """Compute the columns of all mechanisms that a description lacks."""
     span = span or span_of(data, samples.recordings)
-    proposals = tuple(_proposed(data, samples.recordings[0].kinematics, span, candidates, worth))
+    proposals = tuple(_proposed(data, samples.recordings[0].kinematics, span, mechanisms, worth))
     count = proposals[-1].columns.stop if proposals else 0
     joints, blocks = len(data["joints"]), samples.grid.blocks
-    _refuse_too_many(blocks * joints * count * 4 / 1e9, count)
+    size = blocks * joints * count * 4 / 1e9
+    if size > _MOST_MEMORY:
+        raise TooLargeError(
+            f"{count} columns of candidate causes need {size:.0f} GB; expected at most {_MOST_MEMORY:g} GB: use "
+            "a finger of fewer joints and tendons at a time, or shorter recordings"
+        )
     values = np.zeros((blocks, joints, count), dtype=np.float32)
     base = samples.left(data)
     for proposal in proposals:
@@ -75,8 +80,8 @@ def _columns(variant: Variant, data: Data, samples: Samples, base: Numbers) -> I
     if variant.late:
         late = samples.of_recordings(data, with_late_forces(samples.recordings, variant.late))
         yield late.left(data) - base
-    elif variant.secant is not None:
-        yield base - samples.left(variant.secant)
+    elif variant.full is not None:
+        yield base - samples.left(variant.full(1.0))
     else:
         for k, size in enumerate(variant.expected):
             magnitudes = [0.0] * variant.count
@@ -84,29 +89,18 @@ def _columns(variant: Variant, data: Data, samples: Samples, base: Numbers) -> I
             yield (base - samples.left(variant.at(magnitudes))) / size
 
 
-def _refuse_too_many(size: float, columns: int) -> None:
-    if size > _MOST_MEMORY:
-        raise TooLargeError(
-            f"{columns} columns of candidate causes need {size:.0f} GB; expected at most {_MOST_MEMORY:g} GB: use "
-            "a finger of fewer joints and tendons at a time, or shorter recordings"
-        )
-
-
 def _proposed(
-    data: Data, kinematics: int, span: Span, candidates: Sequence[Candidate], worth: Worth | None
+    data: Data, kinematics: int, span: Span, mechanisms: Sequence[Mechanism], worth: Worth | None
 ) -> Iterator[Proposal]:
     first = 0
-    for candidate in candidates:
-        for place in candidate.places(data, kinematics):
-            for variant in candidate.variants(data, place, span):
-                if _is_sane(variant) and (worth is None or worth(candidate, place, variant.shape)):
-                    yield Proposal(candidate, place, variant, slice(first, first + variant.count))
+    for mechanism in mechanisms:
+        for place in mechanism.places(data, kinematics):
+            for variant in mechanism.variants(data, place, span):
+                # recordings of another scale can lead to any value; a description accepts none that is larger
+                is_sane = all(abs(value) <= _LARGEST for value in variant.shape.values())
+                if is_sane and (worth is None or worth(mechanism, place, variant.shape)):
+                    yield Proposal(mechanism, place, variant, slice(first, first + variant.count))
                     first += variant.count
-
-
-def _is_sane(variant: Variant) -> bool:
-    """Return whether a description accepts the variant's numbers; recordings of another scale can lead to any value."""
-    return all(abs(value) <= _LARGEST for value in variant.shape.values())
 
 
 # --- from coarse to fine ----------------------------------------------------------------------------------------------
@@ -123,22 +117,43 @@ LARGEST_SECANT = 3.0  # times the step that its column was computed with; the co
 
 _OF_LAW = {"friction": "joint_friction", "load_friction": "joint_load_friction"}
 _OF_NUMBER = {"viscous": "viscous_friction", "static": "stribeck", "stribeck_velocity": "stribeck"}
+EVERYWHERE, SOMEWHERE, HERE = 0, 1, 2  # levels: all places, those of one joint or tendon, a single one
 Shares = tuple[Numbers, Numbers, Numbers]  # of numbers in magnitudes [numbers, d]; bounds of the magnitudes [d]
+none, square = partial(np.zeros, 0), partial(np.zeros, (0, 0))
 
 
-def hypotheses(columns: CandidateColumns, arms: Numbers, reach: Numbers) -> list[Cause]:
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A mechanism at one place or several together, or a number that may have changed."""
+
+    where: Where
+    terms: tuple[Term, ...] = ()  # what magnitudes of 1 add to a description; none for a number of its own
+    mix: Numbers = field(default_factory=square)  # map from magnitudes to columns [c, d]
+    low: Numbers = field(default_factory=none)  # bounds of the magnitudes [d]
+    high: Numbers = field(default_factory=none)
+    level: int = HERE
+    ordinary: Numbers = field(default_factory=none)  # magnitudes of an ordinary effect at one place [d]
+    step: float = 1.0  # size of its first number at a magnitude of 1, in the unit of the number
+    least_gain: float = 0.0  # share of the rms that it must remove to be considered
+
+    @property
+    def effect(self) -> str:
+        return self.where.effect
+
+
+def hypotheses(columns: CandidateColumns, arms: Numbers, reach: Numbers) -> list[Candidate]:
     """Return all effects that the description may lack, the coarse ones first."""
     count = columns.values.shape[2]
     listed = [_single(proposal, count, arms, reach) for proposal in columns.proposals]
     for effect in SHARED:
         by_place: dict[Place, list[Proposal]] = {}
         for proposal in columns.proposals:
-            if proposal.candidate.name == effect:
+            if proposal.mechanism.name == effect:
                 by_place.setdefault(proposal.place, []).append(proposal)
         for where, level, places in _groups(effect, list(by_place)):
             for parts in _alike([by_place[place] for place in places]):
                 listed.append(_together(where, level, parts, count))
-    return sorted(listed, key=lambda cause: cause.direction.level)
+    return sorted(listed, key=lambda candidate: candidate.level)
 
 
 def _groups(effect: str, places: Sequence[Place]) -> Iterator[tuple[Where, int, list[Place]]]:
@@ -160,8 +175,8 @@ def _groups(effect: str, places: Sequence[Place]) -> Iterator[tuple[Where, int, 
 # --- effects that the description lacks -------------------------------------------------------------------------------
 
 
-def _single(proposal: Proposal, count: int, arms: Numbers, reach: Numbers) -> Cause:
-    variant, place, name = proposal.variant, proposal.place, proposal.candidate.name
+def _single(proposal: Proposal, count: int, arms: Numbers, reach: Numbers) -> Candidate:
+    variant, place, name = proposal.variant, proposal.place, proposal.mechanism.name
     mix = np.zeros((count, variant.count))
     mix[proposal.columns] = np.eye(variant.count)
     low, high = _signed(variant)
@@ -174,14 +189,9 @@ def _single(proposal: Proposal, count: int, arms: Numbers, reach: Numbers) -> Ca
         high = np.minimum(high, LARGEST_DRIFT)
     level = EVERYWHERE if place == Place() else HERE
     least = LEAST_OF_FAST if variant.shape.get("turns", 1.0) != 1.0 else 0.0
-    direction = Direction(mix, low, high, level, np.array(variant.expected), _step(variant), least)
-    term = Term(proposal.candidate, place, variant.shape, (1.0,) * variant.count)
-    return _cause(Where(name, *place), direction, (term,))
-
-
-def _cause(where: Where, direction: Direction, terms: tuple[Term, ...]) -> Cause:
-    candidate = BY_NAME[where.effect]
-    return Cause(where, candidate.title, candidate.explanation, terms=terms, direction=direction)
+    terms = (Term(proposal.mechanism, place, variant.shape, (1.0,) * variant.count),)
+    expected = np.array(variant.expected)
+    return Candidate(Where(name, *place), terms, mix, low, high, level, expected, _step(variant), least)
 
 
 def _signed(variant: Variant) -> tuple[Numbers, Numbers]:
@@ -211,17 +221,14 @@ def _alike(by_place: Sequence[Sequence[Proposal]]) -> Iterator[list[Proposal]]:
         yield [same[k] for same in laws]
 
 
-def _together(where: Where, level: int, parts: Sequence[Proposal], count: int) -> Cause:
+def _together(where: Where, level: int, parts: Sequence[Proposal], count: int) -> Candidate:
     """Combine shapes so that a magnitude of 1 is an ordinary effect at every place."""
     first = parts[0].variant
     mix = np.zeros((count, first.count))
-    terms = []
-    for proposal in parts:
-        expected = proposal.variant.expected
-        mix[np.arange(proposal.columns.start, proposal.columns.stop), np.arange(first.count)] = expected
-        terms.append(Term(proposal.candidate, proposal.place, proposal.variant.shape, expected))
-    direction = Direction(mix, *_signed(first), level, np.array(first.expected), _step(first))
-    return _cause(where, direction, tuple(terms))
+    for part in parts:
+        mix[np.arange(part.columns.start, part.columns.stop), np.arange(first.count)] = part.variant.expected
+    terms = tuple(Term(part.mechanism, part.place, part.variant.shape, part.variant.expected) for part in parts)
+    return Candidate(where, terms, mix, *_signed(first), level, np.array(first.expected), _step(first))
 
 
 # --- numbers that the description has ---------------------------------------------------------------------------------
@@ -244,7 +251,10 @@ class Number:
 def numbers_of(data: Data) -> list[Number]:
     """Return the numbers in the order of `extension_fit.number_columns`."""
     unknowns = [unknown for unknown in estimator_of(data)[0].unknowns if not unknown.path.startswith("bias.")]
-    return [_number(data, k, unknown) for k, unknown in enumerate(unknowns)]
+    return [
+        Number(*_owner(data, unknown.path), k, unknown.path, unknown.start, unknown.lower, unknown.upper)
+        for k, unknown in enumerate(unknowns)
+    ]
 
 
 def estimator_of(data: Data) -> tuple[Estimator, list[str]]:
@@ -252,11 +262,6 @@ def estimator_of(data: Data) -> tuple[Estimator, list[str]]:
     structure = structure_of(data)
     paths = [parameter.path for parameter in native.Instance(structure.start.image).parameters()]
     return Estimator(structure.start.image, structure.group, structure.scale), paths
-
-
-def _number(data: Data, index: int, unknown: Unknown) -> Number:
-    effect, place, side = _owner(data, unknown.path)
-    return Number(effect, place, side, index, unknown.path, unknown.start, unknown.lower, unknown.upper)
 
 
 def _owner(data: Data, path: str) -> tuple[str, Place, int]:
@@ -275,28 +280,31 @@ def _owner(data: Data, path: str) -> tuple[str, Place, int]:
     return path, Place(), 0
 
 
-def number_hypotheses(numbers: Sequence[Number], count: int, first: int) -> list[Cause]:
+def number_hypotheses(numbers: Sequence[Number], count: int, first: int) -> list[Candidate]:
     """Return changes of each effect at each place, of one joint or tendon, and everywhere; the coarse ones first."""
+
     # of `count` columns, those of the numbers begin at `first`
+    def changed(where: Where, level: int, members: Sequence[Number], shares: Shares) -> Candidate:
+        of_numbers, low, high = shares
+        mix = np.zeros((count, of_numbers.shape[1]))
+        mix[[first + member.index for member in members]] = of_numbers
+        return Candidate(where, (), mix, low, high, level)
+
     by_place: dict[tuple[str, Place], list[Number]] = {}
     for number in numbers:
         by_place.setdefault((number.effect, number.place), []).append(number)
     listed = []
     for (effect, place), members in by_place.items():
-        where, level = Where(effect, *place), EVERYWHERE if place == Place() else HERE
-        if any(member.side for member in members):
-            listed.append(_changed(where, level, *_scaled(members), members, count, first))
-            if effect != "stribeck":
-                apart = Where("asymmetric_friction", *place)
-                listed.append(_changed(apart, level, *_apart(members), members, count, first))
-        else:
-            listed.append(_changed(where, level, *_free(members), members, count, first))
+        level, has_sides = EVERYWHERE if place == Place() else HERE, any(member.side for member in members)
+        listed.append(changed(Where(effect, *place), level, members, (_scaled if has_sides else _free)(members)))
+        if has_sides and effect != "stribeck":
+            listed.append(changed(Where("asymmetric_friction", *place), level, members, _apart(members)))
     for effect in SHARED:
         of_effect = {place: members for (name, place), members in by_place.items() if name == effect}
         for where, level, places in _groups(effect, list(of_effect)):
             members = [number for place in places for number in of_effect[place]]
-            listed.append(_changed(where, level, *_scaled(members), members, count, first))
-    return sorted(listed, key=lambda cause: cause.direction.level)
+            listed.append(changed(where, level, members, _scaled(members)))
+    return sorted(listed, key=lambda candidate: candidate.level)
 
 
 def _free(numbers: Sequence[Number]) -> Shares:
@@ -317,28 +325,6 @@ def _apart(numbers: Sequence[Number]) -> Shares:
     """Let the two sides of a law change against each other."""
     most = np.array([min(number.value - number.low for number in numbers)])
     return np.array([[float(number.side)] for number in numbers]), -most, most
-
-
-def _changed(
-    where: Where,
-    level: int,
-    shares: Numbers,
-    low: Numbers,
-    high: Numbers,
-    numbers: Sequence[Number],
-    count: int,
-    first: int,
-) -> Cause:
-    """Return a change of numbers of the description."""
-    mix = np.zeros((count, shares.shape[1]))
-    mix[[first + number.index for number in numbers]] = shares
-    direction = Direction(mix, low, high, level)
-    candidate = BY_NAME.get(where.effect)
-    if candidate is None:
-        return Cause(where, where.effect.replace("_", " "), direction=direction)
-    _, look, at = candidate.explanation.partition("Look ")
-    explanation = f"The description has this effect; its number is different now. {look}{at}".strip()
-    return Cause(where, candidate.title, explanation, direction=direction)
 
 
 def with_numbers(data: Data, added: Numbers) -> dict[str, Any]:

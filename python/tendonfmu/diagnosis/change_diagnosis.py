@@ -6,142 +6,63 @@ numbers, or a term that it lacks, in the new recordings only.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from scipy import stats
 
-from tendonfmu.arrays import Data, Flags, Numbers
-from tendonfmu.diagnosis.answer import Asked, Compared, answered, not_taken, reported
+from tendonfmu.arrays import Data, Numbers
+from tendonfmu.diagnosis.answer import Asked, Compared, answered, cause_of, not_taken, reported
 from tendonfmu.diagnosis.base import Base
+from tendonfmu.diagnosis.candidate_columns import with_numbers
 from tendonfmu.diagnosis.change_search import ChangeSearch, interval_of
 from tendonfmu.diagnosis.contact_scan import event_gain, events_of, unusual, without_events
-from tendonfmu.diagnosis.effects import Where
-from tendonfmu.diagnosis.extension_fit import with_known
+from tendonfmu.diagnosis.effects import Place, Where
+from tendonfmu.diagnosis.effects.mechanism import data_number
+from tendonfmu.diagnosis.effects.places import thresholds
+from tendonfmu.diagnosis.effects.words import NBSP, quantity
+from tendonfmu.diagnosis.extension_fit import added_paths, with_known
 from tendonfmu.diagnosis.gain import Gain, measure_gain
-from tendonfmu.diagnosis.names import names_in
+from tendonfmu.diagnosis.names import names_in, size_of
+from tendonfmu.diagnosis.reference import steady_load
 from tendonfmu.diagnosis.result import (
     Cause,
+    CausePlace,
     ChangedSize,
     Diagnosis,
-    Event,
     Experiment,
+    Invisible,
     SteadyLoad,
     Unexplained,
+    by_gain,
     with_error,
 )
-from tendonfmu.diagnosis.samples import Samples, Series
-from tendonfmu.diagnosis.selection import SIGNIFICANCE, absorbed_effects, by_gain, confirmed
-from tendonfmu.diagnosis.sizes import sized, with_sizes_by_recording
-from tendonfmu.statistics import Interval, gain_interval, make_folds
-
-# --- a steady load ----------------------------------------------------------------------------------------------------
-
-
-BEYOND = 2.0  # times what the reference itself leaves about its level, or the distance between its recordings
-OTHER_SIDE = 0.01  # largest share of stretches whose mean is on the other side
-
-
-def steady_load(series: Series, left: Numbers, is_now: Flags, seed: int = 0) -> SteadyLoad | None:
-    """Return the load at the joint where it is largest; None if no level moved beyond the reference's scatter."""
-    loads = []
-    for joint in range(left.shape[1]):
-        then, now = (_Side.of(series, left[:, joint], series.used & side) for side in (~is_now, is_now))
-        if min(len(then.means), len(now.means)) < 2:
-            continue
-        load = _at(joint, then, now, seed)
-        if load is not None:
-            loads.append(load)
-    best = max(loads, key=lambda load: abs(load.size.change.value), default=None)
-    return best and replace(best, p_value=min(1.0, best.p_value * left.shape[1]))
-
-
-@dataclass(frozen=True)
-class _Side:
-    """The mean torque of one side."""
-
-    level: float  # mean, N·m
-    spread: float  # rms about the level, N·m
-    apart: float  # largest distance of a recording's mean from the level, N·m
-    means: Numbers  # by stretch of 2 s
-    squares: Numbers
-    counts: Numbers
-
-    @staticmethod
-    def of(series: Series, values: Numbers, used: Flags) -> _Side:
-        rows = np.flatnonzero(used)
-        if not len(rows):
-            return _Side(0.0, 0.0, 0.0, np.zeros(0), np.zeros(0), np.zeros(0))
-        own = values[rows]
-        level = float(own.mean())
-        by_recording = [float(own[series.recording[rows] == k].mean()) for k in np.unique(series.recording[rows])]
-        folds = make_folds(replace(series, used=used))
-        counts = np.bincount(folds.stretch, minlength=folds.stretches).astype(np.float64)
-        sums = [np.bincount(folds.stretch, values[folds.rows] ** k, minlength=folds.stretches) for k in (1, 2)]
-        return _Side(
-            level,
-            float(own.std()),
-            max(abs(other - level) for other in by_recording),
-            np.asarray(sums[0] / counts, dtype=np.float64),
-            np.asarray(sums[1], dtype=np.float64),
-            counts,
-        )
-
-    @property
-    def error(self) -> float:
-        """Standard error of the level."""
-        return float(np.std(self.means, ddof=1) / np.sqrt(len(self.means)))
-
-    def about(self, level: float) -> Numbers:
-        """Return Σ (x − level)² by stretch [K]."""
-        return np.asarray(self.squares - 2.0 * level * self.means * self.counts + level**2 * self.counts)
-
-
-def _at(joint: int, then: _Side, now: _Side, seed: int) -> SteadyLoad | None:
-    moved = now.level - then.level
-    if abs(moved) <= BEYOND * max(then.spread, then.apart):
-        return None
-    if float(np.mean(np.sign(now.means - then.level) != np.sign(moved))) > OTHER_SIDE:
-        return None
-    gain = gain_interval(now.about(then.level), now.about(now.level), seed)
-    if not gain.low > 0.0:  # NaN where too little is left to say
-        return None
-    error = float(np.hypot(then.error, now.error))
-    levels = (with_error(then.level, then.error), with_error(now.level, now.error), with_error(moved, error))
-    size = ChangedSize("torque", "N.m", *levels)
-    p_value = float(stats.ttest_ind(then.means, now.means, equal_var=False).pvalue)
-    return SteadyLoad(joint + 1, size, gain, p_value)
-
+from tendonfmu.diagnosis.samples import Samples
+from tendonfmu.diagnosis.selection import SIGNIFICANCE, Judged, confirmed, invisible_effects, names_needed
+from tendonfmu.model import native
+from tendonfmu.statistics import Interval
 
 LEAST_UNKNOWN = 0.25  # of the rms: recordings of an unchanged finger differ by this much
 LEVEL = 0.001  # significance level of this difference
 SPREAD = 2.0  # standard deviations over the stretches of the reference: other motions have another error
 FEWEST = 4  # least number of stretches on either side
+LEAST_OF_NOW = 0.05  # of the present value: a change from a smaller number is not reported as a share of it
+# numbers that say of which form a term is, not how large it is
+_FORM = ("stribeck_velocity", "beyond", "turns", "time_constant", "reaction", "rest_angle", "displacement")
 REPEAT = "Repeat the motions of the reference exactly, at the same load and pretension."
 
 
-def diagnose_change(asked: Asked, base: Base) -> Diagnosis:
-    """Find what has changed since the reference."""
-    return _Changes(asked, base).diagnosis()
-
-
-def sizes_now(asked: Asked, base: Base, keys: Sequence[Where]) -> list[tuple[Where, ChangedSize]]:
-    """Return how large these effects are in the new recordings, named or not."""
-    return _Changes(asked, base).sizes(keys)
-
-
-class _Changes:
-    """Everything that is reported of a change."""
+class Changes:
+    """What has changed since the reference, and everything that is reported of it."""
 
     def __init__(self, asked: Asked, base: Base) -> None:
         self._asked, self._given, self._base = asked, asked.given, base
-        self._reference = list(base.samples.recordings)
-        self._now, self._held, self._tests = (
-            list(each) for each in (asked.given.whole, asked.given.training, asked.given.tests)
-        )
-        everything = [*self._reference, *self._now, *self._tests]
+        self._reference = base.samples.recordings
+        everything = [*self._reference, *self._given.whole, *self._given.tests]
         samples = Samples.of(base.model.data, everything, asked.settings.threads)
         self._all = samples.as_rests_demand(base.model.data)
 
@@ -158,12 +79,11 @@ class _Changes:
             return self._result(dropped)
 
     def sizes(self, keys: Sequence[Where]) -> list[tuple[Where, ChangedSize]]:
-        """Return the sizes of effects at places in the new recordings, all of them free."""
+        """Return how large these effects are in the new recordings, named or not, all of them free."""
         search = self._search = self._searching(self._without_events())
         search.free(keys)
-        changes = [search.certain(k) for k in range(len(search.causes))]
-        listed = [sized(search, changes, k) for k in range(len(changes))]
-        return [(change.where, change.changed) for change in listed if change.changed is not None]
+        search.causes = [search.certain(k) for k in range(len(search.causes))]
+        return [(change.where, sized(search, k)["changed"]) for k, change in enumerate(search.causes)]
 
     def _without_events(self) -> Samples:
         """Return the samples without contact and stalls."""
@@ -173,74 +93,65 @@ class _Changes:
         self._usual = tuple(event for event in events if event.recording not in names)
         return self._all.without(out)
 
-    def _changed_events(self) -> Sequence[Event]:
-        durations = [sum(recording.duration for recording in side) for side in (self._now, self._reference)]
-        return unusual(self._events, self._usual, durations[0] / durations[1])
-
     def _searching(self, samples: Samples) -> ChangeSearch:
-        first, last = len(self._reference), len(self._reference) + len(self._now)
-        now, tests = range(first, last), range(last, len(samples.recordings))
-        asked = self._asked
-        return ChangeSearch(self._base.model.data, samples, self._base.least, now, tests, asked.least_gain, asked.seed)
+        first = len(self._reference)
+        last, asked = first + len(self._given.training), self._asked
+        new, tests = range(first, last), range(last, len(samples.recordings))
+        return ChangeSearch(self._base.model.data, samples, self._base.least, new, tests, asked.least_gain, asked.seed)
 
     # --- verified on unseen data ---
 
-    def _verified(self) -> list[Cause]:
+    def _verified(self) -> list[Judged]:
         """Drop the changes that unseen data do not confirm, and return them."""
         search = self._search
         # blocks of tests [B]; without tests, the held-out parts of the new recordings are judged in turn
-        unseen = search.sides.test if self._given.tests else None
+        unseen = search.test if self._given.tests else None
 
-        def judge(changes: list[Cause]) -> tuple[list[Cause], list[int]]:
+        def judge(changes: list[Judged]) -> tuple[list[Judged], list[int]]:
             if len(changes) < len(search.causes):
                 search.keep(changes)
             grams = search.grams(unseen=unseen)
             after, stretch = grams.unseen_residual(), grams.counted_stretch
             without = [search.grams(k, unseen).unseen_residual() for k in range(len(search.causes))]
             gains = [interval_of(left, after, stretch) for left in without]
-            beside = [search.certain(k) for k in range(len(search.causes))]
-            order = sorted(range(len(gains)), key=lambda k: -gains[k].value)
-            named = [search.causes[k].effect for k in order]
+            judged = [replace(change, gain=gain) for change, gain in zip(search.causes, gains, strict=True)]
+            needed = names_needed(judged)
             weak = [
                 k
-                for place, k in enumerate(order)
-                if not gains[k].low > 0.0
-                or beside[k].p_value >= SIGNIFICANCE
+                for k, (cause, left) in enumerate(zip(judged, without, strict=True))
+                if not cause.gain.low > 0.0
+                or search.certain(k).p_value >= SIGNIFICANCE
                 or not search.matters(
-                    gains[k].value,
-                    search.error * float(np.linalg.norm(without[k]) / np.linalg.norm(after)),
-                    named[place],
-                    named[:place],
+                    cause.gain.value, search.error * float(np.linalg.norm(left) / np.linalg.norm(after)), needed[k]
                 )
             ]
-            return [replace(change, gain=gain) for change, gain in zip(search.causes, gains, strict=True)], weak
+            return judged, weak
 
         changes, dropped = confirmed(search.causes, judge)
-        certain = [replace(search.certain(k), gain=change.gain) for k, change in enumerate(changes)]
-        search.keep(by_gain(certain))
+        search.keep(by_gain(replace(search.certain(k), gain=change.gain) for k, change in enumerate(changes)))
         return dropped
 
     # --- the models ---
 
-    def _learned(self) -> list[Cause]:
+    def _learned(self) -> list[Judged]:
         """Return the changes as learned without the samples that they are judged on."""
         search = self._search
-        held = np.zeros(len(search.series.time), dtype=bool)
+        held, training = np.zeros(len(search.series.time), dtype=bool), self._given.training
         for segment in self._all.grid.segments:
             number = segment.recording - len(self._reference)
-            if 0 <= number < len(self._held):
-                held[segment.blocks] = segment.mean(self._held[number].held_out[segment.part]) > 0.0
+            if 0 <= number < len(training):
+                held[segment.blocks] = segment.mean(training[number].held_out[segment.part]) > 0.0
         if not held.any() or not search.causes:
             return search.causes
         return search.moved_on(search.grams(unseen=held))
 
-    def _written(self, changes: Sequence[Cause]) -> Data:
+    def _written(self, changes: Sequence[Judged]) -> Data:
         """Return the reference model with changes, with what is known of its numbers."""
         return with_known(self._search.now_data(changes), self._given.whole, self._asked.settings)
 
     # --- what is reported ---
 
-    def _result(self, dropped: Sequence[Cause]) -> Diagnosis:
+    def _result(self, dropped: Sequence[Judged]) -> Diagnosis:
         given, search = self._given, self._search
         learned = self._learned()
         models = [self._search.now_data(learned[:k]) for k in range(len(learned) + 1)]
@@ -253,35 +164,41 @@ class _Changes:
             return self._result(dropped)
         compared = self._compared()
         causes = [
-            reported(with_sizes_by_recording(search, k, sized(search, search.causes, k)), own)
+            reported(search.causes[k], own, **with_sizes_by_recording(search, k, sized(search, k)))
             for k, own in enumerate(compared)
         ]
-        views, load = self._views(), self._load()
+        series, load, before = search.series, self._load(), search.samples.residual(search.data)
+        after = search.samples.residual(search.now_data()) if search.causes else before
+        durations = [sum(recording.duration for recording in side) for side in (given.training, self._reference)]
+        events = unusual(self._events, self._usual, durations[0] / durations[1])
         return answered(
             self._asked,
             gain,
-            (self._now_series(), *views),
+            (replace(series, used=series.used & search.now), before, after),
             causes=causes,
             unexplained=self._unexplained(),
             warnings=self._warnings(),
             noise_floor=tuple(float(value) for value in np.minimum(self._floor(), gain.extended.test_rms)),
             floor_source="what remains on unseen stretches without the errors that both recordings share",
             **not_taken(
-                [replace(change, terms=(), alike=(), size="") for change in [*dropped, *search.refused]],
+                [
+                    cause_of(change, confusable_with=(), places=(CausePlace(*change.where.place, {}),))
+                    for change in [*dropped, *search.refused]
+                ],
                 {},
-                sum(recording.duration for recording in given.tests or self._held),
+                sum(recording.duration for recording in given.tests or given.training),
             ),
-            invisible=tuple(absorbed_effects(search.selection, REPEAT)),
+            invisible=self._invisible(),
             events=self._events,
             experiment=Experiment(self._next(causes)),
             detection=None,
             nominal_data=self._written(()),
             extended_data=self._written(search.causes),
             tested=search.tried,
-            event_gain=event_gain(models[-1], given.whole, self._changed_events()),
+            event_gain=event_gain(models[-1], given.whole, events),
             kind="change",
             load=load,
-            repeated=search.repeated,
+            repeated=len(search.repeats),
         )
 
     def _measured(self, models: Sequence[Data]) -> Gain:
@@ -299,7 +216,7 @@ class _Changes:
         """Return, for each change, what is left without it and with it."""
         search = self._search
         left = search.left()  # with all changes, without the background
-        now, reference = search.informative & search.sides.now, search.informative & ~search.sides.now
+        now, reference = search.informative & search.now, search.informative & ~search.now
         compared = []
         for k, change in enumerate(search.causes):
             added = search.column(k) @ change.magnitudes
@@ -307,27 +224,16 @@ class _Changes:
             compared.append(Compared(search.series, left + added, left, added, now, reference))
         return compared
 
-    def _now_series(self) -> Series:
-        series = self._search.series
-        return replace(series, used=series.used & self._search.sides.now)
-
-    def _views(self) -> tuple[Numbers, Numbers]:
-        """Return what the reference model leaves of all recordings, without the changes and with them, N·m [B, n]."""
-        search = self._search
-        before = search.samples.residual(search.data)
-        return before, search.samples.residual(search.now_data()) if search.causes else before
-
     def _warnings(self) -> list[str]:
         folds, judged = self._search.folds, self._search.judged
         now = int(judged.sum())
-        warnings = []
         # a motion that the reference has exactly is compared with it sample by sample
-        if now < 4 or (folds.folds - now < 4 and not self._search.repeated):
-            warnings.append(
-                "less than 16 s of the reference or of the new recordings can be compared (free of contact, similar "
-                "loads), so only a large change can be certain; record a minute of the same motion for both"
-            )
-        return warnings
+        if now >= 4 and (folds.folds - now >= 4 or self._search.repeats):
+            return []
+        return [
+            "less than 16 s of the reference or of the new recordings can be compared (free of contact, similar "
+            "loads), so only a large change can be certain; record a minute of the same motion for both"
+        ]
 
     def _unexplained(self) -> Unexplained:
         """Return whether the new recordings, with all changes, are explained worse than the reference is by itself."""
@@ -335,43 +241,46 @@ class _Changes:
         squares, rows = search.grams().left()
         is_now = search.stretches_now
         if is_now.sum() < FEWEST or (~is_now).sum() < FEWEST:
-            return Unexplained(0.0, "", tuple(0.0 for _ in range(squares.shape[1])))
+            return Unexplained(0.0, "", (0.0,) * squares.shape[1])
         level = np.log(np.maximum(squares / rows[:, None], 1e-300)) / 2.0  # of the rms
         p_values = stats.ttest_ind(level[is_now], level[~is_now], equal_var=False, alternative="greater").pvalue
         now, then = (np.sqrt(squares[side].sum(axis=0) / rows[side].sum()) for side in (is_now, ~is_now))
         worse = np.clip(1.0 - then / np.maximum(now, 1e-300), 0.0, 1.0)
-        p_value = min(1.0, float(np.nanmin(p_values)) * len(worse))
-        worst = int(np.argmax(worse * now))
+        p_value, worst = min(1.0, float(np.nanmin(p_values)) * len(worse)), int(np.argmax(worse * now))
         apart = float(level[is_now, worst].mean() - level[~is_now, worst].mean())
         beyond = apart > SPREAD * float(level[~is_now, worst].std())
-        unknown = bool(worse[worst] >= LEAST_UNKNOWN and p_values[worst] * len(worse) < LEVEL and beyond)
-        share = tuple(float(1.0 - (1.0 - share) ** 2) if unknown else 0.0 for share in worse)
-        gain = Interval(0.0, 0.0, 0.0)
-        if unknown:
-            spread = float(np.sqrt(sum(np.var(level[s, worst], ddof=1) / s.sum() for s in (is_now, ~is_now))))
-            ends = [1.0 - (1.0 - float(worse[worst])) * np.exp(sign * 1.96 * spread) for sign in (1.0, -1.0)]
-            gain = Interval(float(worse[worst]), float(ends[0]), float(ends[1]))
+        if not (worse[worst] >= LEAST_UNKNOWN and p_values[worst] * len(worse) < LEVEL and beyond):
+            return Unexplained(0.0, "", (0.0,) * len(worse), p_value)
+        share = 1.0 - (1.0 - worse) ** 2
+        spread = float(np.sqrt(sum(np.var(level[s, worst], ddof=1) / s.sum() for s in (is_now, ~is_now))))
+        ends = [1.0 - (1.0 - float(worse[worst])) * np.exp(sign * 1.96 * spread) for sign in (1.0, -1.0)]
         joint = names_in(search.data).joint(worst + 1)
-        words = f"the model fits {joint} worse in the new recordings than in the reference; no known change explains it"
-        whole = float(np.array(share) @ now**2 / max(float((now**2).sum()), 1e-300))
-        return Unexplained(whole, words if unknown else "", share, p_value, unknown, gain)
+        return Unexplained(
+            share=float(share @ now**2 / max(float((now**2).sum()), 1e-300)),
+            description=f"the model fits {joint} worse in the new recordings than in the reference; no known change "
+            "explains it",
+            by_joint=tuple(share.tolist()),
+            p_value=p_value,
+            unknown=True,
+            gain=Interval(float(worse[worst]), float(ends[0]), float(ends[1])),
+        )
 
     def _load(self) -> SteadyLoad | None:
         """Return what remains of a load both with and without the means of the changes."""
-        search = self._search
-        loads: list[SteadyLoad] = []
-        for means in (False, True) if search.causes else (False,):
-            load = steady_load(search.series, search.torque_left(means), search.sides.now, self._asked.seed)
-            if load is None:
-                return None
-            loads.append(load)
-        return min(loads, key=lambda load: abs(load.size.change.value))
+        search, seed = self._search, self._asked.seed
+        ways = (False, True) if search.causes else (False,)
+        loads = [steady_load(search.series, search.torque_left(means), search.now, seed) for means in ways]
+        known = [load for load in loads if load is not None]
+        return min(known, key=lambda load: abs(load.size.change.value)) if len(known) == len(ways) else None
 
     def _floor(self) -> Numbers:
         """Return the rms of the new recordings, N·m [n]."""
         squares, rows = self._search.selection.grams.left()
         is_now = self._search.stretches_now
         return np.asarray(np.sqrt(squares[is_now].sum(axis=0) / max(float(rows[is_now].sum()), 1.0)))
+
+    def _invisible(self) -> tuple[Invisible, ...]:
+        return tuple(replace(hidden, experiment=REPEAT) for _, hidden in invisible_effects(self._search.selection))
 
     def _next(self, causes: Sequence[Cause]) -> str:
         search = self._search
@@ -381,6 +290,104 @@ class _Changes:
                 f"{REPEAT} Then repeat them at half and at twice the pretension: effects that grow with the tendon "
                 "force then differ from those that do not."
             )
-        if not search.repeated and (causes or absorbed_effects(search.selection, REPEAT)):
+        if not search.repeats and (causes or self._invisible()):
             return f"{REPEAT} Then their difference shows the change alone."
         return ""
+
+
+# --- how large a change is --------------------------------------------------------------------------------------------
+
+
+def sized(search: ChangeSearch, number: int) -> dict[str, Any]:
+    """Return the size of one of the changes, as fields of `Cause`, estimated together with all others."""
+    changes = search.causes
+    now = search.now_data()
+    units = {parameter.path: parameter.unit for parameter in native.Instance.from_description(now).parameters()}
+    if changes[number].terms:
+        return _new_term(search, number, now, units)
+    then = search.now_data([change for k, change in enumerate(changes) if k != number])
+    return _other_number(search, changes[number], then, now, units)
+
+
+def _relative_error(change: Judged) -> float:
+    """Return the standard error of the whole change over its size, along the direction in which it was found."""
+    value = float(np.linalg.norm(change.magnitudes))
+    direction = change.magnitudes / max(value, 1e-300)
+    return math.sqrt(max(float(direction @ change.covariance @ direction), 0.0)) / max(value, 1e-300)
+
+
+def _new_term(search: ChangeSearch, number: int, now: Data, units: Mapping[str, str]) -> dict[str, Any]:
+    """Return the size of a term that the description lacks."""
+    changes, change = search.causes, search.causes[number]
+    first, terms = len(search.terms(changes[:number])), change.scaled()
+    paths = added_paths(with_numbers(search.data, search.added(changes)), search.terms(changes))[first:]
+    places = tuple(
+        CausePlace(*term.place, {path: (data_number(now, path), units[path]) for path in added if path in units})
+        for term, added in zip(terms, paths, strict=False)
+    )
+    main = _main([path for place in places for path in place.parameters], now)
+    unit = units.get(main[0], "1") if main else "1"
+    value = math.hypot(*(data_number(now, path) for path in main)) if len(main) > 1 else data_number(now, main[0])
+    error = abs(value) * _relative_error(change)
+    size, intervals = with_error(value, error), {path: with_error(data_number(now, path), error) for path in main}
+    name = "amplitude" if len(main) > 1 else main[0].rsplit(".", 1)[-1]
+    words = f"{size_of(change.effect, places, thresholds(now))}, beyond what the reference has"
+    changed = ChangedSize(name, unit, Interval(0.0, 0.0, 0.0), size, size)
+    return {"places": places, "changed": changed, "size": words, "intervals": intervals}
+
+
+def _main(paths: Sequence[str], now: Data) -> list[str]:
+    """Return the paths that say how large the term is."""
+    waves = [path for path in paths if path.rsplit(".", 1)[-1] in ("sine", "cosine")]
+    if waves:
+        return waves[:2]
+    sizes = [path for path in paths if path.rsplit(".", 1)[-1] not in _FORM] or list(paths)
+    return [max(sizes, key=lambda path: abs(data_number(now, path)))]
+
+
+def _other_number(
+    search: ChangeSearch, change: Judged, then: Data, now: Data, units: Mapping[str, str]
+) -> dict[str, Any]:
+    """Return the size of a number that the description has; `then` is the description of now without this change."""
+    by_place: dict[Place, dict[str, tuple[float, str]]] = {}
+    for k in np.flatnonzero(change.mix[-len(search.numbers) :].any(axis=1)):
+        number = search.numbers[k]
+        by_place.setdefault(number.place, {})[number.path] = (data_number(now, number.path), units[number.path])
+    places = tuple(CausePlace(*place, numbers) for place, numbers in by_place.items())
+    paths = [path for place in places for path in place.parameters]
+    main = max(paths, key=lambda path: abs(data_number(now, path) - data_number(then, path)))
+    before, after = data_number(then, main), data_number(now, main)
+    name, unit, apart = main.rsplit(".", 1)[-1], units[main], change.effect == "asymmetric_friction"
+    if apart:
+        before, after = _difference(then, main), _difference(now, main)
+        name = f"{name}, positive minus negative direction"
+    error = abs(after - before) * _relative_error(change)
+    more = ""
+    if before and abs(before) >= LEAST_OF_NOW * abs(after) and not apart:
+        more = f"{100 * ((after - before) / before):+.0f}{NBSP}%: ".replace("-", "−")
+    where = f", at the largest of {len(places)} places" if len(places) > 1 else ""
+    words = f"{more}{quantity(before, unit)} then, {quantity(after, unit)} now{where}"
+    changed = ChangedSize(
+        name, unit, with_error(before, 0.0), with_error(after, error), with_error(after - before, error)
+    )
+    intervals = {main: with_error(data_number(now, main), error)}
+    return {"places": places, "changed": changed, "size": words, "intervals": intervals}
+
+
+def _difference(data: Data, path: str) -> float:
+    """Return the difference between the two sides of a law in a number, positive minus negative direction."""
+    sign, sides = (1.0, (".positive.", ".negative.")) if ".positive." in path else (-1.0, (".negative.", ".positive."))
+    return sign * (data_number(data, path) - data_number(data, path.replace(*sides)))
+
+
+def with_sizes_by_recording(search: ChangeSearch, number: int, known: dict[str, Any]) -> dict[str, Any]:
+    """Add the size in each of several new recordings, in their order."""
+    size: ChangedSize = known["changed"]
+    if len(search.new_recordings) < 2:
+        return known
+    moved = size.change.value
+    by = [
+        with_error(size.reference.value + moved * share, abs(moved) * error)
+        for share, error in search.shares_by_recording(number)
+    ]
+    return known | {"changed": replace(size, by=tuple(by))}

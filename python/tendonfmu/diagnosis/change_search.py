@@ -8,7 +8,7 @@ description has, or a term that it lacks. The error is that on held-out parts of
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from tendonfmu.arrays import Array, Data, Flags, Numbers
-from tendonfmu.diagnosis.candidate_columns import number_hypotheses, numbers_of, with_numbers
+from tendonfmu.diagnosis.candidate_columns import Candidate, number_hypotheses, numbers_of, with_numbers
 from tendonfmu.diagnosis.effects import Term, Where
 from tendonfmu.diagnosis.extension_fit import extended_description
 from tendonfmu.diagnosis.reference import (
@@ -27,12 +27,13 @@ from tendonfmu.diagnosis.reference import (
     less_reference,
     outside,
 )
-from tendonfmu.diagnosis.result import Cause, with_error
+from tendonfmu.diagnosis.result import with_error
 from tendonfmu.diagnosis.samples import Samples, exact_model
 from tendonfmu.diagnosis.selection import (
     CERTAIN,
     SIGNIFICANCE,
     CauseSearch,
+    Judged,
     LeastSizes,
     Selection,
     is_alike,
@@ -47,14 +48,6 @@ AS_MUCH = 0.98  # of what the best takes off: what is linearised tells no smalle
 STEPS = 3  # of Newton's method, with the derivatives of the reference
 
 
-@dataclass(frozen=True)
-class Sides:
-    """Which blocks belong to which recordings."""
-
-    now: Flags  # blocks of the new recordings [B]
-    test: Flags  # those of them that are not learned from [B]
-
-
 class ChangeSearch(CauseSearch):
     """Adds one change after the other; all of them are free in the new recordings only."""
 
@@ -63,51 +56,46 @@ class ChangeSearch(CauseSearch):
         data: Data,
         samples: Samples,
         least: LeastSizes,
-        now: Sequence[int],
+        new: Sequence[int],
         tests: Sequence[int],
         least_gain: float,
         seed: int,
     ) -> None:
-        """Prepare all columns; `samples` are those of the reference and all new recordings."""
+        """Prepare all columns; `samples` are those of the reference, then of the `new` recordings and the `tests`."""
         super().__init__(MOST_CHANGES)
-        self._least_gain = least_gain
-        self.data, self.samples = data, samples
+        self._least_gain, self.data, self.samples = least_gain, data, samples
         view = self._view = look(data, samples, least)
-        self.series = view.series
-        self.sides = Sides(np.isin(self.series.recording, [*now, *tests]), np.isin(self.series.recording, tests))
-        self._new = {*now, *tests}
-        force, then = (
-            samples.grid.forces(view.predicted.recordings),
-            set(np.unique(self.series.recording).tolist()) - self._new,
-        )
-        self._repeats = find_repeats(self.series, force, sorted(then), sorted(self._new))
+        series = self.series = view.series
+        # blocks of the new recordings, and those of them that are not learned from [B]
+        self.now, self.test = np.isin(series.recording, [*new, *tests]), np.isin(series.recording, tests)
+        self.new_recordings = [int(number) for number in np.unique(series.recording[self.now & ~self.test])]
+        force = samples.grid.forces(view.predicted.recordings)
+        then, now = (np.unique(series.recording[side]).tolist() for side in (~self.now, self.now))
+        self.repeats = find_repeats(series, force, then, now)
         shift = self._level_shift() @ np.linalg.pinv(moment_arms(data))
-        background, scale = background_columns(
-            data, self.series, force - shift, view.columns, samples.residual(data), seed
-        )
+        residual = samples.residual(data)
+        background, scale = background_columns(data, series, force - shift, view.columns, residual, seed)
         shared = np.concatenate([view.nominal, background], axis=2)
-        self._shared = less_reference(shared, self.series, self._repeats)
-        self._target = less_reference(self.series.target, self.series, self._repeats)
+        self._shared = less_reference(shared, series, self.repeats)
+        self._target = less_reference(series.target, series, self.repeats)
         self._scale = np.concatenate([view.scale, scale])
         self.numbers = numbers_of(data)
-        self._values = self._both() * self.sides.now[:, None, None]
-        self._informative = replace(self.series, used=self.series.used & ~outside(self.series, self._repeats))
-        learned = replace(self._informative, used=self._informative.used & ~self.sides.test)
-        self.folds, self.judged = folds_of_sides(learned, self.sides.now)
+        self._values = self._both() * self.now[:, None, None]
+        # without blocks that nothing is learned from
+        self._informative = replace(series, used=series.used & ~outside(series, self.repeats))
+        learned = replace(self._informative, used=self._informative.used & ~self.test)
+        self.folds, self.judged = folds_of_sides(learned, self.now)
         self.candidates = self._candidates()
         self._known: dict[bytes, tuple[Products, Flags]] = {}
-        self.tried = len({cause.where for cause in self.candidates})
+        self.tried = len({candidate.where for candidate in self.candidates})
         self._selection: Selection | None = None
         self._whole = self.error
 
-    def _candidates(self) -> list[Cause]:
+    def _candidates(self) -> list[Candidate]:
         count, own = self._view.columns.values.shape[2], len(self.numbers)
-        missing = [
-            replace(cause, direction=replace(cause.direction, mix=np.pad(cause.direction.mix, ((0, own), (0, 0)))))
-            for cause in self._view.candidates
-        ]
+        missing = [replace(each, mix=np.pad(each.mix, ((0, own), (0, 0)))) for each in self._view.candidates]
         present = number_hypotheses(self.numbers, count + own, count)
-        return sorted([*missing, *present], key=lambda cause: cause.direction.level)
+        return sorted([*missing, *present], key=lambda candidate: candidate.level)
 
     def _both(self) -> Array:
         """Return the columns of what the description lacks, then those of its own numbers [B, n, c + u]."""
@@ -116,31 +104,29 @@ class ChangeSearch(CauseSearch):
     def _level_shift(self) -> Numbers:
         """Return by how much the mean residual of each recording differs from that of the reference, N·m [B, n]."""
         left, series = self.torque_left(), self.series
-        then = left[series.used & ~self.sides.now].mean(axis=0)
-        shift = np.zeros_like(left)
-        for number in np.unique(series.recording):
+        then, shift = left[series.used & ~self.now].mean(axis=0), np.zeros_like(left)
+        for number in np.unique(series.recording[series.used]):
             rows = series.recording == number
-            own = left[rows & series.used]
-            shift[rows] = own.mean(axis=0) - then if len(own) else 0.0
+            shift[rows] = left[rows & series.used].mean(axis=0) - then
         return shift
 
     # --- rounds ---
 
-    def _try_next(self, tried: set[str]) -> tuple[Cause, bool] | None:
+    def _try_next(self, tried: set[str]) -> tuple[Judged, bool] | None:
         best = self._best(tried)
         if best is None or self.selection.gain(best)[0] < self._least_gain:
             return None
         change, certain = self._named(best)
-        named = [cause.effect for cause in self.causes]
-        if not certain or not self.matters(change.gain.value, self.error, change.effect, named):
+        names = names_with(change.effect, [cause.effect for cause in self.causes])
+        if not certain or not self.matters(change.gain.value, self.error, names):
             return change, False
         self.causes.append(change)
         self._settle()
         return change, True
 
-    def _best(self, tried: set[str]) -> Cause | None:
+    def _best(self, tried: set[str]) -> Judged | None:
         """Return the candidate that lowers the error most, at the coarsest place that is as good."""
-        ranked = [cause for cause in self.selection.ranked() if cause.effect not in tried]
+        ranked = self.selection.ranked(tried)
         if not ranked:
             return None
         best = self.selection.refined(ranked[0].effect)
@@ -150,11 +136,11 @@ class ChangeSearch(CauseSearch):
                 best = self.selection.refined(present.effect)
         return self._at_best_place(best) if len(self.new_recordings) > 1 else best
 
-    def _explains_as_much(self, cause: Cause, best: Cause) -> bool:
+    def _explains_as_much(self, cause: Judged, best: Judged) -> bool:
         least = AS_MUCH * (self.selection.base - best.unseen).sum()
         return is_alike(cause.unseen, best.unseen) or (self.selection.base - cause.unseen).sum() >= least
 
-    def _at_best_place(self, best: Cause) -> Cause:
+    def _at_best_place(self, best: Judged) -> Judged:
         """Return, of places that are nearly as good, the one with the smallest error."""
         # The size is free in each new recording here, because a growing change differs from one recording to the next.
         options = [best, *self.selection.near(best)]
@@ -162,31 +148,26 @@ class ChangeSearch(CauseSearch):
             return best
         products, counted = self._products(None)
         chosen = products.chosen(self._together(self.causes), None)
-        u = chosen.nominal_count
         recording = self.series.recording[chosen.folds.rows]
         masks = [(recording == number)[:, None, None] for number in self.new_recordings]
-        parts, places, at = [], [], 0
-        for option in options:
-            column = chosen.table[:, :, u:] @ option.direction.mix.astype(np.float32)
-            own = np.concatenate([column * mask for mask in masks], axis=2)
-            parts.append(own)
-            places.append(slice(at, at + own.shape[2]))
-            at += own.shape[2]
-        every = chosen.with_own(np.concatenate(parts, axis=2))
+        candidates = chosen.table[:, :, chosen.nominal_count :]
+        columns = [candidates @ option.mix.astype(np.float32) for option in options]
+        own = [np.concatenate([column * mask for mask in masks], axis=2) for column in columns]
+        every = chosen.with_own(np.concatenate(own, axis=2))
         grams = Grams(every, self._target_now(), self._scales(self.causes), counted)
-        errors = []
-        for option, place in zip(options, places, strict=True):
-            mix = np.eye(at)[:, place]
-            low, high = (np.tile(end, len(masks)) for end in (option.direction.low, option.direction.high))
-            errors.append(grams.error(mix, low, high)[0])
+        ways = np.split(np.eye(every.count), np.cumsum([part.shape[2] for part in own])[:-1], axis=1)
+        errors = [
+            grams.error(way, *(np.tile(end, len(masks)) for end in (option.low, option.high)))[0]
+            for option, way in zip(options, ways, strict=True)
+        ]
         return options[int(np.argmin(errors))]
 
-    def _named(self, cause: Cause) -> tuple[Cause, bool]:
+    def _named(self, cause: Judged) -> tuple[Judged, bool]:
         """Return the change and whether it is certain: a gain of more than two standard errors and a small p-value."""
-        grams, own = self.selection.grams, cause.direction
-        _, by_fold = grams.error(own.mix, own.low, own.high)
-        gain, error = gain_of(grams.unseen_residual(), grams.unseen_residual(own.mix, by_fold), grams.counted_stretch)
-        p_value, covariance = self.certainty_of(grams, own.mix)
+        grams = self.selection.grams
+        _, by_fold = grams.error(cause.mix, cause.low, cause.high)
+        gain, error = gain_of(grams.unseen_residual(), grams.unseen_residual(cause.mix, by_fold), grams.counted_stretch)
+        p_value, covariance = self.certainty_of(grams, cause.mix)
         alike = self.selection.alike(cause, self.selection.ranked())
         change = replace(cause, covariance=covariance, gain=with_error(gain, error), p_value=p_value, alike=alike)
         return change, gain > CERTAIN * error and p_value < SIGNIFICANCE
@@ -196,11 +177,10 @@ class ChangeSearch(CauseSearch):
         """Root of Σ e² on held-out parts of the new recordings, with the changes so far, N·m."""
         return float(np.sqrt(self.selection.base.sum()))
 
-    def matters(self, gain: float, before: float, effect: str, named: Sequence[str]) -> bool:
-        """Return whether a change gains enough."""
+    def matters(self, gain: float, before: float, names: int) -> bool:
+        """Return whether a change gains enough; `names` is how many names count with it."""
         # It must also remove enough of the whole difference, so that small remnants of a large change are not named.
-        least = self._least_gain
-        return gain >= least * names_with(effect, named) and gain * before >= least * self._whole
+        return gain >= self._least_gain * names and gain * before >= self._least_gain * self._whole
 
     def _settle(self) -> None:
         for _ in range(STEPS):
@@ -211,31 +191,29 @@ class ChangeSearch(CauseSearch):
         """Free these effects at these places in the new recordings, whether they are certain or not."""
         for key in keys:
             grams = self.selection.grams
-            own = [cause for cause in self.candidates if cause.where == key]
+            own = [candidate for candidate in self.candidates if candidate.where == key]
             if own:
-                bounds = [(cause.direction.mix, cause.direction.low, cause.direction.high) for cause in own]
-                best = own[int(np.argmin([grams.error(*bound)[0] for bound in bounds]))]
-                self.causes.append(replace(best, magnitudes=np.zeros(best.direction.mix.shape[1])))
+                best = min(own, key=lambda candidate: grams.error(candidate.mix, candidate.low, candidate.high)[0])
+                self.causes.append(Judged(**vars(best), magnitudes=np.zeros(best.mix.shape[1])))
                 self._settle()
 
-    def certain(self, number: int) -> Cause:
+    def certain(self, number: int) -> Judged:
         """Return a change with the covariance and p-value that it has together with all others."""
         change, grams = self.causes[number], self.grams(number)
-        own = change.direction
-        mix = own.mix[own.mix.any(axis=1)]  # only its own columns are candidates
+        mix = change.mix[change.mix.any(axis=1)]  # only its own columns are candidates
         p_value, covariance = self.certainty_of(grams, mix)
         return replace(change, covariance=covariance, p_value=p_value)
 
-    def moved_on(self, grams: Grams) -> list[Cause]:
+    def moved_on(self, grams: Grams) -> list[Judged]:
         """Return the changes with updated magnitudes, from a solution in which their columns are shared."""
         sizes = [len(change.magnitudes) for change in self.causes]
         steps = np.split(grams.refitted[-sum(sizes) :], np.cumsum(sizes)[:-1]) if sizes else []
         return [
-            replace(change, magnitudes=np.clip(change.magnitudes + own, change.direction.low, change.direction.high))
+            replace(change, magnitudes=np.clip(change.magnitudes + own, change.low, change.high))
             for change, own in zip(self.causes, steps, strict=True)
         ]
 
-    def keep(self, changes: Sequence[Cause]) -> None:
+    def keep(self, changes: Sequence[Judged]) -> None:
         """Continue with these changes only."""
         self.causes = list(changes)
         self.causes = self.moved_on(self.grams())
@@ -247,21 +225,13 @@ class ChangeSearch(CauseSearch):
     def selection(self) -> Selection:
         """Everything else that may have changed, given the changes so far."""
         if self._selection is None:
-            self._selection = self._look()
+            known = {change.effect for change in self.causes}
+            left = [candidate for candidate in self.candidates if candidate.effect not in known]
+            products, judged = self._products(None)
+            chosen = products.chosen(self._together(self.causes), None)
+            grams = Grams(chosen, self._target_now(), self._scales(self.causes), judged)
+            self._selection = Selection(grams, left, self._view.least)
         return self._selection
-
-    def _look(self) -> Selection:
-        known = {change.effect for change in self.causes}
-        left = [cause for cause in self.candidates if cause.effect not in known]
-        products, judged = self._products(None)
-        chosen = products.chosen(self._together(self.causes), None)
-        return Selection(Grams(chosen, self._target_now(), self._scales(self.causes), judged), left, self._view.least)
-
-    @property
-    def new_recordings(self) -> list[int]:
-        """Numbers of the new recordings that are learned from."""
-        learned = self.sides.now & ~self.sides.test
-        return [int(number) for number in np.unique(self.series.recording[learned])]
 
     def left(self) -> Numbers:
         """Return what is left with all changes and without what both share, N·m [B, n]; 0 where nothing is used."""
@@ -277,34 +247,24 @@ class ChangeSearch(CauseSearch):
         target = self._target_now()
         if without is not None:
             alone = self.causes[without]
-            used = np.flatnonzero(alone.direction.mix.any(axis=1))
-            target = target + self._values @ self._mixed(alone)
+            used = np.flatnonzero(alone.mix.any(axis=1))
+            target = target + self._values @ (alone.mix @ alone.magnitudes)
         products, judged = self._products(unseen)
         return Grams(products.chosen(self._together(kept), used), target, self._scales(kept), judged)
 
-    def grams_of_recording(self, number: int, only: int) -> Grams:
-        """Return the products with one change in one new recording as the only candidate."""
-        change = self.causes[number]
-        column = (self._values @ self._mixed(change))[:, :, None]
-        of = {
-            new_recording: column * (self.series.recording == new_recording)[:, None, None]
-            for new_recording in self.new_recordings
-        }
-        kept = [change for k, change in enumerate(self.causes) if k != number]
-        shared = [self._values @ self._together(kept), *(of[recording] for recording in of if recording != only)]
-        nominal = np.concatenate([self._shared, *shared], axis=2)
-        products = Products(self.folds, nominal, of[only], self.samples.splines)
-        scale = np.concatenate([self._scales(kept), np.full(len(of) - 1, np.nan)])
-        return Grams(products, self._target_now() + column[:, :, 0], scale, self.judged)
-
     def shares_by_recording(self, number: int) -> list[tuple[float, float]]:
         """Return (value, standard error) for each new recording: which share of a change is in it, 1 for all of it."""
-        shares = []
-        low, high = _share_bounds(self.causes[number])
-        for recording in self.new_recordings:
-            grams = self.grams_of_recording(number, recording)
-            mix = np.eye(1)
-            share = grams.magnitudes(mix, low, high)
+        change, mix, shares = self.causes[number], np.eye(1), []
+        column = (self._values @ (change.mix @ change.magnitudes))[:, :, None]
+        of = {each: column * (self.series.recording == each)[:, None, None] for each in self.new_recordings}
+        kept = [other for k, other in enumerate(self.causes) if k != number]
+        target, scale = self._target_now() + column[:, :, 0], np.full(len(of) - 1, np.nan)
+        for recording, own in of.items():
+            others = [self._values @ self._together(kept), *(of[other] for other in of if other != recording)]
+            nominal = np.concatenate([self._shared, *others], axis=2)
+            products = Products(self.folds, nominal, own, self.samples.splines)
+            grams = Grams(products, target, np.concatenate([self._scales(kept), scale]), self.judged)
+            share = grams.magnitudes(mix, *_share_bounds(change))
             _, covariance = self.certainty_of(grams, mix)
             shares.append((float(share[0]), float(np.sqrt(max(covariance[0, 0], 0.0)))))
         return shares
@@ -312,14 +272,14 @@ class ChangeSearch(CauseSearch):
     def _target_now(self) -> Numbers:
         return self._target - self.moved() if self.causes else self._target
 
-    def _together(self, changes: Sequence[Cause]) -> Numbers:
+    def _together(self, changes: Sequence[Judged]) -> Numbers:
         """Return all columns of the changes [c, k]."""
         empty = np.zeros((self._values.shape[2], 0))
-        return np.concatenate([empty, *(change.direction.mix for change in changes)], axis=1)
+        return np.concatenate([empty, *(change.mix for change in changes)], axis=1)
 
-    def _scales(self, changes: Sequence[Cause]) -> Numbers:
+    def _scales(self, changes: Sequence[Judged]) -> Numbers:
         """Return the scales of the shared columns; columns of changes are free."""
-        free = sum(change.direction.mix.shape[1] for change in changes)
+        free = sum(change.mix.shape[1] for change in changes)
         return np.concatenate([self._scale, np.full(free, np.nan)])
 
     def _products(self, unseen: Flags | None) -> tuple[Products, Flags]:
@@ -330,21 +290,17 @@ class ChangeSearch(CauseSearch):
             self._known[key] = (Products(folds, self._shared, self._values, self.samples.splines), judged)
         return self._known[key]
 
-    def terms(self, changes: Sequence[Cause]) -> list[Term]:
+    def terms(self, changes: Sequence[Judged]) -> list[Term]:
         """Return the terms that changes add to the description of now."""
         return [term for change in changes for term in change.scaled()]
 
-    def added(self, changes: Sequence[Cause]) -> Numbers:
+    def added(self, changes: Sequence[Judged]) -> Numbers:
         """Return what changes add to the numbers that the description has [u]."""
         first = self._view.columns.values.shape[2]
-        parts = [np.zeros(len(self.numbers)), *(self._mixed(change)[first:] for change in changes)]
+        parts = [np.zeros(len(self.numbers)), *((change.mix @ change.magnitudes)[first:] for change in changes)]
         return np.asarray(np.sum(parts, axis=0))
 
-    @staticmethod
-    def _mixed(change: Cause) -> Numbers:
-        return np.asarray(change.direction.mix @ change.magnitudes)
-
-    def now_data(self, changes: Sequence[Cause] | None = None) -> dict[str, Any]:
+    def now_data(self, changes: Sequence[Judged] | None = None) -> dict[str, Any]:
         """Return the description of now, derived from that of the reference."""
         taken = self.causes if changes is None else changes
         return dict(extended_description(with_numbers(self.data, self.added(taken)), self.terms(taken)))
@@ -352,17 +308,12 @@ class ChangeSearch(CauseSearch):
     def moved(self) -> Numbers:
         """Return what the changes add to the model's torque, N·m [B, n]; 0 in the reference."""
         moved = self.samples.left(self.data) - self.samples.left(self.now_data())
-        return np.where(self.sides.now[:, None], moved, 0.0)
+        return np.where(self.now[:, None], moved, 0.0)
 
     @property
     def informative(self) -> Flags:
         """Blocks that something is learned from [B]."""
         return self._informative.used
-
-    @property
-    def repeated(self) -> int:
-        """Number of new recordings that repeat a motion of the reference exactly."""
-        return len(self._repeats)
 
     def torque_left(self, means: bool = False) -> Numbers:
         """Return measured less modelled torque, including the bias but without its own jumps, N·m [B, n]."""
@@ -371,8 +322,8 @@ class ChangeSearch(CauseSearch):
         left = self.samples.grid.means(whole)
         if self.causes:
             moved = self.moved()
-            mean = 0.0 if means else moved[self.series.used & self.sides.now].mean(axis=0)
-            left -= np.where(self.sides.now[:, None], moved - mean, 0.0)
+            mean = 0.0 if means else moved[self.series.used & self.now].mean(axis=0)
+            left -= np.where(self.now[:, None], moved - mean, 0.0)
         return np.asarray(left)
 
     @property
@@ -384,7 +335,7 @@ class ChangeSearch(CauseSearch):
 
     def column(self, number: int) -> Numbers:
         """Return the columns of a change, also in the reference [B, n, d]."""
-        return np.asarray(self._both() @ self.causes[number].direction.mix)
+        return np.asarray(self._both() @ self.causes[number].mix)
 
     # --- certainty ---
 
@@ -404,11 +355,11 @@ class ChangeSearch(CauseSearch):
         return min(1.0, p * self.tried), np.asarray(inverse @ spreads[least] @ inverse)
 
 
-def _share_bounds(change: Cause) -> tuple[Numbers, Numbers]:
+def _share_bounds(change: Judged) -> tuple[Numbers, Numbers]:
     """Return the bounds of the share [1] within which all magnitudes are within theirs."""
     moved = change.magnitudes != 0.0
-    size, own = change.magnitudes[moved], change.direction
-    ends = np.sort(np.stack([own.low[moved] / size, own.high[moved] / size]), axis=0)
+    size = change.magnitudes[moved]
+    ends = np.sort(np.stack([change.low[moved] / size, change.high[moved] / size]), axis=0)
     return np.array([ends[0].max(initial=-np.inf)]), np.array([ends[1].min(initial=np.inf)])
 
 

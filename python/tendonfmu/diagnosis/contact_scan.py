@@ -27,7 +27,6 @@ from tendonfmu.arrays import Data, Flags, Numbers, flagged_rows
 from tendonfmu.detect import (
     SETTLING,
     ContactTuning,
-    DetectionScore,
     Subject,
     TuneWarning,
     free_parts,
@@ -94,9 +93,17 @@ def scan_events(
 def left_out(series: Series, events: Sequence[Event], recordings: Sequence[str]) -> Flags:
     """Return whether each block lies in an event [B]."""
     inside = np.zeros(len(series.time), dtype=bool)
+    for number, name in enumerate(recordings):
+        inside |= (series.recording == number) & _inside(events, name, series.time)
+    return inside
+
+
+def _inside(events: Sequence[Event], recording: str, time: Numbers) -> Flags:
+    """Return which times [N] of a recording lie in one of its events."""
+    inside = np.zeros(len(time), dtype=bool)
     for event in events:
-        own = series.recording == recordings.index(event.recording)
-        inside |= own & (series.time >= event.start) & (series.time <= event.end)
+        if event.recording == recording:
+            inside |= (time >= event.start) & (time <= event.end)
     return inside
 
 
@@ -260,11 +267,8 @@ def unusual(events: Sequence[Event], usual: Sequence[Event], longer: float) -> S
 
 def without_events(recording: FitRecording, events: Sequence[Event]) -> FitRecording:
     """Return the recording without the samples that lie in its events."""
-    inside = np.zeros(len(recording.time), dtype=bool)
-    for event in events:
-        if event.recording == str(recording.path):
-            inside |= (recording.time >= event.start) & (recording.time <= event.end)
-    return replace(recording, train=recording.train & ~inside, held_out=recording.held_out & ~inside)
+    outside = ~_inside(events, str(recording.path), recording.time)
+    return replace(recording, train=recording.train & outside, held_out=recording.held_out & outside)
 
 
 # --- what leaving them out gains --------------------------------------------------------------------------------------
@@ -274,26 +278,17 @@ def event_gain(data: Mapping[str, Any], recordings: Sequence[FitRecording], even
     """Return the share of the rms that leaving the events out removes, with a 95 % interval; None without events."""
     if not events:
         return None
-    within, samples, free, free_samples = 0.0, 0, [], []
+    within, samples, parts = 0.0, 0, []  # Σ r² in the events and their samples; both of the blocks outside [B, 2]
     for recording in recordings:
         squares = np.sum(recording.run(data).residual ** 2, axis=1)
         judged = recording.train & np.isfinite(squares)
-        inside = np.zeros(len(judged), dtype=bool)
-        for event in events:
-            if event.recording == str(recording.path):
-                inside |= (recording.time >= event.start) & (recording.time <= event.end)
+        inside = _inside(events, str(recording.path), recording.time)
         within += float(squares[judged & inside].sum())
         samples += int((judged & inside).sum())
         blocks = blocks_of(recording.time, judged & ~inside)
-        free.append(blocks.sums(np.where(judged, squares, 0.0)))
-        free_samples.append(blocks.sums(np.ones(len(judged))))
-    return _gain(within, samples, np.concatenate(free), np.concatenate(free_samples))
-
-
-def _gain(within: float, samples: int, free: Numbers, free_samples: Numbers) -> Interval | None:
-    """Compute the interval from the sums of r²."""
-    # `within` is Σ r² in the events, over `samples` samples. `free` is Σ r² of the blocks outside of events [B], over
-    # `free_samples` samples [B].
+        sums = [blocks.sums(values) for values in (np.where(judged, squares, 0.0), np.ones(len(judged)))]
+        parts.append(np.column_stack(sums))
+    free, free_samples = np.concatenate(parts).T
     rest, count = float(free.sum()), float(free_samples.sum())
     if len(free) < intervals.FEWEST_BLOCKS or not rest > 0.0:
         return None
@@ -319,14 +314,10 @@ AROUND = 1.0  # s, on either side of a contact
 
 def detection_gain(nominal: Data, extended: Data, recordings: Sequence[FitRecording]) -> DetectionGain | None:
     """Return the gain for contact detection; None without labelled contact or if nothing can be tuned."""
-    labelled = [recording.recording for recording in recordings if recording.recording.contact is not None]
-    labelled = [recording for recording in labelled if recording.contact is not None and recording.contact.any()]
-    if not labelled:
-        return None
+    every = [recording.recording for recording in recordings]
+    labelled = [recording for recording in every if recording.contact is not None and recording.contact.any()]
     kinematics = recordings[0].kinematics
-    free = _free_motion(finger_from_data(nominal), [recording.recording for recording in recordings], kinematics)
-    if not free:
-        return None
+    free = _free_motion(finger_from_data(nominal), every, kinematics) if labelled else []
     hours = sum(float(recording.time[-1] - recording.time[0]) - SETTLING for recording in free) / 3600
     if not hours > 0:
         return None
@@ -334,15 +325,17 @@ def detection_gain(nominal: Data, extended: Data, recordings: Sequence[FitRecord
         tuned = [_tuned(data, free, kinematics, min(max(RATE, 1.0 / hours), HIGHEST)) for data in (nominal, extended)]
     except InputError:  # nothing can be tuned, for example with a bias without drift
         return None
-    before, after = (_score(tuning.description_.data, labelled, kinematics) for tuning in tuned)
+    subjects = [Subject(Path("finger"), finger_from_data(tuning.description_.data), packed=False) for tuning in tuned]
+    before, after = (pooled([run_track(one, each, kinematics, None).score() for each in labelled]) for one in subjects)
+    delays = [float(np.median(score.delays)) if len(score.delays) else None for score in (before, after)]
     return DetectionGain(
         events=len(before.events),
         found_before=before.found,
         found_after=after.found,
         false_alarms_before=len(before.false_alarms),
         false_alarms_after=len(after.false_alarms),
-        median_delay_before=_median(before),
-        median_delay_after=_median(after),
+        median_delay_before=delays[0],
+        median_delay_after=delays[1],
         smallest_push_before=tuple(map(float, tuned[0].push_)),
         smallest_push_after=tuple(map(float, tuned[1].push_)),
     )
@@ -353,16 +346,9 @@ def detection_gain(nominal: Data, extended: Data, recordings: Sequence[FitRecord
 
 def _free_motion(finger: Finger, recordings: Sequence[Recording], kinematics: int) -> list[Recording]:
     whole = [recording for recording in recordings if recording.contact is None or not recording.contact.any()]
-    free = [recording for recording in whole if _is_free(finger, recording, kinematics)]
-    if free:
-        return free
-    pieces = [
-        piece
-        for recording in recordings
-        if recording.contact is not None
-        for piece in _pieces(recording, recording.contact)
-    ]
-    return [piece for piece in pieces if _is_free(finger, piece, kinematics)]
+    pieces = [piece for each in recordings if each.contact is not None for piece in _pieces(each, each.contact)]
+    free = ([one for one in chosen if _is_free(finger, one, kinematics)] for chosen in (whole, pieces))
+    return next((found for found in free if found), [])
 
 
 def _is_free(finger: Finger, recording: Recording, kinematics: int) -> bool:
@@ -397,12 +383,3 @@ def _tuned(data: Data, free: Sequence[Recording], kinematics: int, rate: float) 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", TuneWarning)
         return tuning.tune(list(free), checked=True)
-
-
-def _score(data: Data, recordings: Sequence[Recording], kinematics: int) -> DetectionScore:
-    subject = Subject(Path("finger"), finger_from_data(data), packed=False)
-    return pooled([run_track(subject, recording, kinematics, None).score() for recording in recordings])
-
-
-def _median(score: DetectionScore) -> float | None:
-    return float(np.median(score.delays)) if len(score.delays) else None

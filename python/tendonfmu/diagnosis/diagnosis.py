@@ -18,8 +18,8 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from tendonfmu.diagnosis.answer import Asked
 from tendonfmu.diagnosis.base import find_base
-from tendonfmu.diagnosis.change_diagnosis import diagnose_change
-from tendonfmu.diagnosis.extension_diagnosis import diagnose_extension
+from tendonfmu.diagnosis.change_diagnosis import Changes
+from tendonfmu.diagnosis.extension_diagnosis import Lacks
 from tendonfmu.diagnosis.extension_fit import FitSettings
 from tendonfmu.diagnosis.inputs import read_input
 from tendonfmu.diagnosis.kinematic_causes import find_kinematic_causes
@@ -67,5 +67,5 @@ def diagnose(
             base = find_base(given.finger, given.reference or given.whole, settings, least_gain)
         asked = Asked(given, least_gain, seed, settings, phases)
         with own_fault("diagnosis"):  # all input has been checked and fitted once
-            diagnosis = diagnose_change(asked, base) if given.reference else diagnose_extension(asked, base)
-            return replace(kinematic.in_diagnosis(diagnosis), seconds=perf_counter() - begun)
+            question = Changes(asked, base) if given.reference else Lacks(asked, base)
+            return replace(kinematic.in_diagnosis(question.diagnosis()), seconds=perf_counter() - begun)

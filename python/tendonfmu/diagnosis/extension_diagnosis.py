@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.arrays import Data, Numbers
-from tendonfmu.diagnosis.answer import Asked, Compared, answered, not_taken, reported
+from tendonfmu.diagnosis.answer import Asked, Compared, answered, cause_of, not_taken, reported
 from tendonfmu.diagnosis.base import Base, refitted
 from tendonfmu.diagnosis.contact_scan import detection_gain, event_gain, events_of, without_events
 from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION, COMMON, OF_LAW, Term, Where
 from tendonfmu.diagnosis.effects.places import law_of, thresholds
-from tendonfmu.diagnosis.experiments.next_experiment import Experiments, Question, plan_experiments
 from tendonfmu.diagnosis.extension_fit import (
     PRESLIDING,
     FittedModel,
@@ -25,12 +24,13 @@ from tendonfmu.diagnosis.extension_fit import (
     with_known,
 )
 from tendonfmu.diagnosis.gain import Gain, Unseen, measure_gain
+from tendonfmu.diagnosis.names import size_of
+from tendonfmu.diagnosis.next_experiment import Experiments, Question, plan_experiments
 from tendonfmu.diagnosis.remainder import measure_remainder, remainder_map, unexplained_of
-from tendonfmu.diagnosis.result import Cause, CausePlace, Diagnosis, Event, Invisible, Unexplained
+from tendonfmu.diagnosis.result import Cause, CausePlace, Diagnosis, Invisible, Unexplained, by_gain
 from tendonfmu.diagnosis.samples import Samples, Span, as_described, span_of
-from tendonfmu.diagnosis.search import Search, calibrated, search, terms_of
-from tendonfmu.diagnosis.selection import SIGNIFICANCE, by_gain, confirmed, invisible_effects, names_with, step_p_value
-from tendonfmu.diagnosis.sizes import size_of
+from tendonfmu.diagnosis.search import ExtensionSearch, calibrated, search, terms_of
+from tendonfmu.diagnosis.selection import SIGNIFICANCE, Judged, confirmed, invisible_effects, names_needed, step_p_value
 from tendonfmu.estimate import SCALING
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import Interval
@@ -48,89 +48,39 @@ LIKE_A_LAW = {*OF_LAW, *SCALING} - {*COMMON}
 class Verified:
     """The causes that unseen data confirm."""
 
-    causes: tuple[Cause, ...]  # in order of gain, the largest first; places of one effect are one cause
+    causes: tuple[Judged, ...]  # in order of gain, the largest first; places of one effect are one cause
+    places: tuple[tuple[CausePlace, ...], ...]  # of each cause
+    intervals: Mapping[str, Interval]  # of the numbers of the extended model, by path
     without: tuple[FittedModel, ...]  # for each cause, the fit that lacks it
-    dropped: tuple[Cause, ...]  # causes that unseen data do not confirm
+    dropped: tuple[Judged, ...]  # causes that unseen data do not confirm
     gain: Gain
     nominal_data: Data  # descriptions as they run online
     extended_data: Data
 
 
-def verify(
-    result: Search, training: Sequence[FitRecording], tests: Sequence[FitRecording], least_gain: float, seed: int
-) -> Verified:
-    """Measure the gain of each cause on unseen data and drop the weak ones."""
-    bench = _Bench(result, training, tests, seed)
-
-    def judge(causes: list[Cause]) -> tuple[list[Cause], list[int]]:
-        fit, without = bench.fit(causes), bench.each_without(causes)
-        gains = [bench.gain(model, fit) for model in without]
-        needed, shares = _needed(causes, gains), bench.shares_of_memory(causes, fit, without)
-        weak = [
-            k
-            for k, (cause, gain) in enumerate(zip(causes, gains, strict=True))
-            if not (
-                gain.low > 0.0
-                and gain.value >= least_gain * needed[k]
-                and (shares[k] >= FORM or cause.effect not in LIKE_A_LAW)
-                and result.base.least.shows_all(cause.effect, cause.terms, fit.data)
-            )
-        ]
-        judged = zip(causes, gains, without, strict=True)
-        return [bench.with_gain(cause, gain, model, fit) for cause, gain, model in judged], weak
-
-    causes, dropped = confirmed(merged(result.causes), judge)
-    fit, nominal = bench.fit(causes), bench.written(bench.nominal)
-    extended = bench.written(fit) if causes else nominal
-    ranked = by_gain(bench.with_places(fit, causes))
-    between = [bench.fit(ranked[: k + 1]).data for k in range(len(ranked) - 1)]
-    return Verified(
-        causes=tuple(ranked),
-        without=tuple(bench.each_without(ranked)),
-        dropped=tuple(dropped),
-        gain=measure_gain(
-            nominal, extended, training, tests, between=between, seed=seed, threads=result.base.settings.threads
-        ),
-        nominal_data=nominal,
-        extended_data=extended,
-    )
-
-
-def _needed(causes: Sequence[Cause], gains: Sequence[Interval]) -> list[float]:
-    """Return how many times the least gain each cause needs: the number of names up to it, the largest gain first."""
-    needed, named = [1.0] * len(causes), list[str]()
-    for k in sorted(range(len(causes)), key=lambda k: -gains[k].value):
-        needed[k] = names_with(causes[k].effect, named)
-        named.append(causes[k].effect)
-    return needed
-
-
-def merged(causes: Sequence[Cause]) -> list[Cause]:
+def merged(causes: Sequence[Judged]) -> list[Judged]:
     """Merge the places of one effect into one cause."""
-    by_effect: dict[str, Cause] = {}
+    by_effect: dict[str, Judged] = {}
     calibrated = CALIBRATED if any(cause.effect == CALIBRATION for cause in causes) else ()
     # a single sensor that was found beside several belongs to them
     for cause in sorted(causes, key=lambda cause: cause.effect != CALIBRATION) if calibrated else causes:
         effect = CALIBRATION if cause.effect in calibrated else cause.effect
-        known = by_effect.get(effect)
-        if known is None:
-            by_effect[effect] = cause
-            continue
-        joint = known.joint if known.joint == cause.joint else None
-        tendon = known.tendon if known.tendon == cause.tendon else None
-        by_effect[effect] = replace(
-            known,
-            where=Where(effect, joint, tendon),
-            terms=(*known.terms, *cause.terms),
-            p_value=min(known.p_value, cause.p_value),
-            alike=(*known.alike, *cause.alike),
-        )
+        known = by_effect.setdefault(effect, cause)
+        if known is not cause:
+            both = zip(known.where.place, cause.where.place, strict=True)
+            by_effect[effect] = replace(
+                known,
+                where=Where(effect, *(one if one == other else None for one, other in both)),
+                terms=(*known.terms, *cause.terms),
+                p_value=min(known.p_value, cause.p_value),
+                alike=(*known.alike, *cause.alike),
+            )
     return [replace(cause, alike=_rivals(cause, by_effect)) for cause in by_effect.values()]
 
 
-def _rivals(cause: Cause, named: Collection[str]) -> tuple[Cause, ...]:
+def _rivals(cause: Judged, named: Collection[str]) -> tuple[Judged, ...]:
     """Return the best rival of every effect that is not named itself."""
-    rivals: dict[str, Cause] = {}
+    rivals: dict[str, Judged] = {}
     for other in cause.alike:
         if other.effect not in named:
             rivals.setdefault(other.effect, other)
@@ -141,24 +91,60 @@ class _Bench:
     """Fits of any set of causes, and what they leave of unseen data."""
 
     def __init__(
-        self, result: Search, training: Sequence[FitRecording], tests: Sequence[FitRecording], seed: int
+        self, found: ExtensionSearch, training: Sequence[FitRecording], tests: Sequence[FitRecording], seed: int
     ) -> None:
-        base = result.base
-        self._result, self._settings, self._seed = result, base.settings, seed
-        self._full, self.nominal, self._samples = result.extended, base.nominal, base.samples
+        base = found.base
+        self._found, self._settings, self._seed, self._data = found, base.settings, seed, (training, tests)
+        self._full, self.nominal, self._samples = found.model, base.nominal, base.samples
         if not tests:  # exclude the judged samples from the fits
             self._samples = Samples.of(self.nominal.data, training, self._settings.threads)
             self._samples = replace(self._samples, drift=self._samples.as_rests_demand(self.nominal.data).drift)
             self._full, self.nominal = (
                 refitted(model, self._samples, self._settings) for model in (self._full, self.nominal)
             )
-        self._training = training
         self._unseen = Unseen(self.nominal.data, training, tests, self._settings.threads)
         self._predicted = self._samples.at_predicted_forces(self._full.data)
-        self._fits: dict[frozenset[int], FittedModel] = {frozenset(map(id, terms_of(result.causes))): self._full}
-        self._order: dict[frozenset[int], list[Term]] = {next(iter(self._fits)): terms_of(result.causes)}
+        self._fits: dict[frozenset[int], FittedModel] = {frozenset(map(id, terms_of(found.causes))): self._full}
+        self._order: dict[frozenset[int], list[Term]] = {next(iter(self._fits)): terms_of(found.causes)}
 
-    def fit(self, causes: Sequence[Cause]) -> FittedModel:
+    def verified(self, least_gain: float) -> Verified:
+        """Measure the gain of each cause on unseen data and drop the weak ones."""
+
+        def judge(causes: list[Judged]) -> tuple[list[Judged], list[int]]:
+            fit, without = self.fit(causes), self.each_without(causes)
+            judged = [self.with_gain(cause, model, fit) for cause, model in zip(causes, without, strict=True)]
+            needed, shares = names_needed(judged), self.shares_of_memory(causes, fit, without)
+            weak = [
+                k
+                for k, cause in enumerate(judged)
+                if not (
+                    cause.gain.low > 0.0
+                    and cause.gain.value >= least_gain * needed[k]
+                    and (shares[k] >= FORM or cause.effect not in LIKE_A_LAW)
+                    and self._found.base.least.shows_all(cause.effect, cause.terms, fit.data)
+                )
+            ]
+            return judged, weak
+
+        causes, dropped = confirmed(merged(self._found.causes), judge)
+        ranked, fit, nominal = by_gain(causes), self.fit(causes), self.written(self.nominal)
+        places, intervals = self.numbers(fit, causes)
+        between = [self.fit(ranked[: k + 1]).data for k in range(len(ranked) - 1)]
+        extended = self.written(fit) if causes else nominal
+        return Verified(
+            causes=tuple(ranked),
+            places=tuple(tuple(places[id(term)] for term in cause.terms) for cause in ranked),
+            intervals=intervals,
+            without=tuple(self.each_without(ranked)),
+            dropped=tuple(dropped),
+            gain=measure_gain(
+                nominal, extended, *self._data, between=between, seed=self._seed, threads=self._settings.threads
+            ),
+            nominal_data=nominal,
+            extended_data=extended,
+        )
+
+    def fit(self, causes: Sequence[Judged]) -> FittedModel:
         """Return the fit with some of the causes; it starts at that with all of them."""
         terms = terms_of(causes)
         key = frozenset(map(id, terms))
@@ -169,12 +155,12 @@ class _Bench:
             self._fits[key] = fit_extended(self.nominal, order, self._predicted, self._settings, self._full, rough=True)
         return self._fits[key]
 
-    def each_without(self, causes: Sequence[Cause]) -> list[FittedModel]:
+    def each_without(self, causes: Sequence[Judged]) -> list[FittedModel]:
         """Return, for each cause, the fit that lacks it."""
         return [self.fit([*causes[:k], *causes[k + 1 :]]) for k in range(len(causes))]
 
     def shares_of_memory(
-        self, causes: Sequence[Cause], fit: FittedModel, without: Sequence[FittedModel]
+        self, causes: Sequence[Judged], fit: FittedModel, without: Sequence[FittedModel]
     ) -> list[float]:
         """Return the rms that each cause explains over that which the memory of friction explains; inf without one."""
         after = float(self._unseen.squares(fit.data).sum())
@@ -182,51 +168,38 @@ class _Bench:
         of_memory = sum(own for own, cause in zip(explained, causes, strict=True) if cause.effect == PRESLIDING)
         return [float(np.sqrt(own / of_memory)) if of_memory else np.inf for own in explained]
 
-    def gain(self, without: FittedModel, model: FittedModel) -> Interval:
-        return self._unseen.gain(without.data, model.data, self._seed)
-
-    def with_gain(self, cause: Cause, gain: Interval, without: FittedModel, model: FittedModel) -> Cause:
+    def with_gain(self, cause: Judged, without: FittedModel, model: FittedModel) -> Judged:
         """Return a cause with its gain; one of the base has the p-value of that gain."""
+        cause = replace(cause, gain=self._unseen.gain(without.data, model.data, self._seed))
         if cause.p_value < SIGNIFICANCE:
-            return replace(cause, gain=gain)
-        p_value = step_p_value(self._unseen.squares(without.data), self._unseen.squares(model.data))
-        return replace(cause, gain=gain, p_value=p_value)
+            return cause
+        squares = [self._unseen.squares(each.data) for each in (without, model)]
+        return replace(cause, p_value=step_p_value(*squares))
 
-    def with_places(self, model: FittedModel, causes: Sequence[Cause]) -> list[Cause]:
-        """Return the causes with the numbers of each of their places in a model that was fitted with all of them."""
-        order = self._order.get(frozenset(id(term) for cause in causes for term in cause.terms), [])
-        found = cause_parameters(self.nominal.data, order, model)
-        numbers = {id(term): own for term, own in zip(order, found, strict=True)}
-        intervals = intervals_of(model, self._predicted, self._settings) if order else {}
-        return [
-            replace(
-                cause,
-                intervals=intervals,
-                places=tuple(CausePlace(*term.place, numbers[id(term)]) for term in cause.terms),
-            )
-            for cause in causes
-        ]
+    def numbers(
+        self, model: FittedModel, causes: Sequence[Judged]
+    ) -> tuple[dict[int, CausePlace], Mapping[str, Interval]]:
+        """Return the numbers of each term, by its identity, in a model with all causes, and intervals by path."""
+        order = self._order.get(frozenset(map(id, terms_of(causes))), [])
+        found = zip(order, cause_parameters(self.nominal.data, order, model), strict=True)
+        places = {id(term): CausePlace(*term.place, numbers) for term, numbers in found}
+        return places, intervals_of(model, self._predicted, self._settings) if order else {}
 
     def written(self, model: FittedModel) -> Data:
         """Return a description with what is known of its numbers."""
-        return with_known(model.data, self._training, self._settings)
+        return with_known(model.data, self._data[0], self._settings)
 
 
 MOST_RIVALS = 3  # rivals of a cause for which an experiment is planned
 
 
-def diagnose_extension(asked: Asked, base: Base) -> Diagnosis:
-    """Find what the description lacks."""
-    searched = search(base, least_gain=asked.least_gain, seed=asked.seed, phases=asked.phases)
-    return _Result(asked, searched).diagnosis()
+class Lacks:
+    """What the description lacks, and everything that is reported of it."""
 
-
-class _Result:
-    """Everything that is reported of a search."""
-
-    def __init__(self, asked: Asked, searched: Search) -> None:
-        self._asked, self._given, self._searched = asked, asked.given, searched
-        self._series = searched.last.series
+    def __init__(self, asked: Asked, base: Base) -> None:
+        self._asked, self._given = asked, asked.given
+        self._searched = search(base, least_gain=asked.least_gain, seed=asked.seed, phases=asked.phases)
+        self._series = self._searched.view.series
 
     def diagnosis(self) -> Diagnosis:
         """Return the diagnosis; its duration is still 0."""
@@ -253,7 +226,11 @@ class _Result:
             noise_floor=tuple(float(value) for value in floor),
             floor_source="the part of the error on unseen stretches that nothing recorded predicts",
             **not_taken(
-                [cause for cause in [*verified.dropped, *searched.small] if cause.effect not in named],
+                [
+                    cause_of(cause, places=tuple(CausePlace(*term.place, {}) for term in cause.terms))
+                    for cause in [*verified.dropped, *searched.small]
+                    if cause.effect not in named
+                ],
                 settling,
                 sum(recording.duration for recording in given.tests or given.training),
             ),
@@ -263,13 +240,13 @@ class _Result:
             detection=detection_gain(verified.nominal_data, verified.extended_data, everything) if named else None,
             nominal_data=verified.nominal_data,
             extended_data=verified.extended_data,
-            tested=len({cause.where for cause in searched.last.selection.causes}),
+            tested=len({candidate.where for candidate in searched.view.selection.candidates}),
             event_gain=event_gain(verified.extended_data, given.whole, searched.events),
         )
 
     def _warnings(self) -> list[str]:
         folds = self._searched.first.folds
-        warnings = list(self._searched.extended.warnings)
+        warnings = list(self._searched.model.warnings)
         if not folds.enough:
             warnings.append("less than 8 s of motion: too short to name a cause; record a minute or more")
         elif folds.folds < 8:
@@ -282,15 +259,13 @@ class _Result:
 
     def _verified(self) -> Verified:
         searched, given, asked = self._searched, self._given, self._asked
-        unseen = [self._events_in(recording) for recording in given.tests]
+        data, threads = searched.model.data, asked.settings.threads
+        each = [Samples.of(data, [recording], threads) for recording in given.tests]
+        unseen = [events_of(data, samples, asked.seed)[0] for samples in each]
         tests = [without_events(recording, events) for recording, events in zip(given.tests, unseen, strict=True)]
         self._events = (*searched.events, *(event for events in unseen for event in events))
         training = [without_events(recording, searched.events) for recording in given.training]
-        return verify(searched, training, tests, asked.least_gain, asked.seed)
-
-    def _events_in(self, recording: FitRecording) -> Sequence[Event]:
-        data = self._searched.extended.data
-        return events_of(data, Samples.of(data, [recording], self._asked.settings.threads), self._asked.seed)[0]
+        return _Bench(searched, training, tests, asked.seed).verified(asked.least_gain)
 
     # --- causes ---
 
@@ -299,17 +274,17 @@ class _Result:
         return as_described(self._searched.base.samples.residual(data), data)
 
     def _cause(self, k: int, verified: Verified, after: Numbers) -> Cause:
-        cause, before = verified.causes[k], self._left(verified.without[k].data)
+        cause, places, before = verified.causes[k], verified.places[k], self._left(verified.without[k].data)
         compared = Compared(self._series, before, after, before - after, self._series.used)
         if cause.effect == CALIBRATION:
-            return reported(calibrated(cause), compared)
-        size = size_of(cause.effect, cause.places, thresholds(verified.extended_data))
-        return reported(replace(cause, size=size), compared)
+            return reported(cause, compared, **calibrated(cause, places, verified.intervals))
+        size = size_of(cause.effect, places, thresholds(verified.extended_data))
+        return reported(cause, compared, places=places, intervals=verified.intervals, size=size)
 
     # --- what is left, and what to do next ---
 
     def _unexplained(self, left: Numbers) -> Unexplained:
-        view, samples, used = self._searched.last, self._searched.base.samples, self._series.used
+        view, samples, used = self._searched.view, self._searched.base.samples, self._series.used
         measured = samples.grid.means([recording.target for recording in samples.recordings])
         # the residual itself must be in neither
         force, torque = samples.grid.forces(view.predicted.recordings), measured - left
@@ -325,40 +300,41 @@ class _Result:
 
     def _experiments(self, verified: Verified) -> tuple[Experiments, dict[Where, str], tuple[Invisible, ...]]:
         """Plan experiments for causes that cannot be distinguished or are uncertain, and for effects not visible."""
-        rivals = [
-            Question(cause.terms[0], rival)
+        found = self._searched
+        pairs = [
+            (cause.terms[0], other.terms[0].ordinary)
             for cause in verified.causes
-            for rival in [other.terms[0].ordinary for other in cause.alike[:MOST_RIVALS] if other.effect != CALIBRATION]
-            if all(self._is_in_nominal(term) for term in (cause.terms[0], rival))
+            for other in [rival for rival in cause.alike[:MOST_RIVALS] if rival.effect != CALIBRATION]
         ]
-        known = [*verified.causes, *verified.dropped, *self._searched.small]
-        unseen = invisible_effects(self._searched.last.selection, verified.causes, known, self._asked.least_gain)
+        rivals = [Question(*pair) for pair in pairs if all(self._is_in_nominal(term) for term in pair)]
+        known = {term.where for term in terms_of([*verified.causes, *verified.dropped, *found.small])}
+        unseen = invisible_effects(found.view.selection, verified.causes, known, self._asked.least_gain)
         nearest: dict[str, Question] = {}
-        for cause, hidden in unseen:
-            if self._is_in_nominal(cause.terms[0]):
-                nearest.setdefault(cause.effect, Question(cause.terms[0].ordinary, absorbed=hidden.absorbed))
+        for candidate, hidden in unseen:
+            if self._is_in_nominal(candidate.terms[0]):
+                nearest.setdefault(candidate.effect, Question(candidate.terms[0].ordinary, absorbed=hidden.absorbed))
         dropped = [cause for cause in verified.dropped if cause.terms and self._is_in_nominal(cause.terms[0])]
-        questions = [*rivals, *nearest.values()]
-        first = len(questions)
-        questions += [Question(cause.terms[0]) for cause in dropped]
-        noise = self._left(self._searched.extended.data)[self._series.used].std(axis=0)
+        questions = [*rivals, *nearest.values(), *(Question(cause.terms[0]) for cause in dropped)]
+        noise = self._left(found.model.data)[self._series.used].std(axis=0)
         with self._asked.phases.start("next experiment", len(questions) or None) as step:
             planned = plan_experiments(
-                self._searched.base.nominal.data,  # without the causes in question
-                self._searched.base.samples.recordings,
+                found.base.nominal.data,  # without the causes in question
+                found.base.samples.recordings,
                 questions,
                 noise=[float(value) for value in noise],
                 seed=self._asked.seed,
                 progress=lambda done, total: step(done),
             )
-        number_of = {effect: len(rivals) + k for k, effect in enumerate(nearest)}
-        shown = []
-        for cause, hidden in unseen:
-            number = number_of.get(cause.effect)
-            if number is not None:
-                hidden = replace(hidden, experiment=planned.sentence(number), motion=planned.motion(number))
-            shown.append(hidden)
-        settling = {cause.where: planned.sentence(first + k) for k, cause in enumerate(dropped)}
+        number_of = {effect: number for number, effect in enumerate(nearest, start=len(rivals))}
+        shown = [
+            replace(hidden, experiment=planned.sentence(number), motion=planned.motion(number))
+            if (number := number_of.get(hidden.where.effect)) is not None
+            else hidden
+            for _, hidden in unseen
+        ]
+        settling = {
+            cause.where: planned.sentence(k) for k, cause in enumerate(dropped, start=len(rivals) + len(nearest))
+        }
         return planned, settling, tuple(shown)
 
     @cached_property
@@ -368,7 +344,7 @@ class _Result:
     def _is_in_nominal(self, term: Term) -> bool:
         """Return whether the nominal description has the place, and the law there that the effect belongs to."""
         nominal = self._searched.base.nominal.data
-        if term.place not in term.candidate.places(nominal, self._searched.base.samples.recordings[0].kinematics):
+        if term.place not in term.mechanism.places(nominal, self._searched.base.samples.recordings[0].kinematics):
             return False
-        shapes = term.candidate.find_shapes(nominal, term.place, self._nominal_span)
+        shapes = term.mechanism.find_shapes(nominal, term.place, self._nominal_span)
         return any(law_of(shape) == law_of(term.shape) for shape in shapes)

@@ -16,7 +16,7 @@ import numpy as np
 
 from tendonfmu.arrays import Array, Data, Numbers
 from tendonfmu.diagnosis.effects import Place, Term, by_name
-from tendonfmu.diagnosis.effects.candidate import sides_at
+from tendonfmu.diagnosis.effects.mechanism import sides_at
 from tendonfmu.diagnosis.effects.terms import changed_law
 from tendonfmu.diagnosis.result import with_error
 from tendonfmu.diagnosis.samples import Samples
@@ -58,9 +58,9 @@ class MemoryTerm(Term):
         elements = [row for row in present if row["effect"] == PRESLIDING]
         others = [row for row in present if row["effect"] not in (PRESLIDING, CORDS)]
         cords = [row for row in present if row["effect"] == CORDS]
-        if self.candidate.name == PRESLIDING:
+        if self.mechanism.name == PRESLIDING:
             elements = [dict(row) for row in self.rows]
-        elif self.candidate.name == RELAXATION:
+        elif self.mechanism.name == RELAXATION:
             times = [row["relaxation_time"] for row in self.rows]
             elements = [{**row, "relaxation_time": time} for row, time in zip(elements, times, strict=True)]
         else:
@@ -88,11 +88,6 @@ def memory_terms(data: Data, rows: Sequence[Row]) -> list[tuple[Term, ...]]:
 def memory_of(data: Data) -> list[Row]:
     """Return the rows of memory of a description."""
     return [row for row in data.get("extensions") or [] if row["effect"] in (PRESLIDING, CORDS)]
-
-
-def needs_presliding(term: Term) -> bool:
-    """Return whether a term is part of a memory that presliding has to be there for."""
-    return term.candidate.name in (RELAXATION, CORDS)
 
 
 def _term(name: str, rows: tuple[Row, ...]) -> MemoryTerm:
@@ -236,19 +231,13 @@ def structure_of(data: Data) -> Structure:
     return _with_scale(build_structure(finger_from_data(data, Path("finger")), Choice()), data)
 
 
-def key_of(data: Data, name: str) -> str:
-    """Return a name of an unknown that another description has, too: rows of `extensions` by effect and place."""
-    if not name.startswith("extensions["):
-        return name
-    head, _, last = name.partition(".")
-    number = int(head[len("extensions[") : -1]) - 1
-    rows = data["extensions"]
-
-    def mark(row: Mapping[str, Any]) -> tuple[Any, ...]:
-        return tuple(row.get(key) for key in ("effect", "joint", "tendon", "level"))
-
-    same = sum(mark(row) == mark(rows[number]) for row in rows[:number])
-    return f"{mark(rows[number])} {same}.{last}"
+def key_of(data: Data, path: str) -> Any:
+    """Return what names a number in other descriptions, too: rows of `extensions` by effect and place, as they move."""
+    place = re.match(r"extensions\[(\d+)\]", path)
+    if place is None:
+        return path
+    *before, own = (tuple(row.get(key) for key in PLACE) for row in extension_rows(data)[: int(place[1])])
+    return own, before.count(own), path[place.end() :]
 
 
 def with_known(data: Mapping[str, Any], recordings: Sequence[FitRecording], settings: FitSettings) -> Mapping[str, Any]:
@@ -303,7 +292,12 @@ def cause_parameters(
 ) -> tuple[Mapping[str, tuple[float, str]], ...]:
     """Return the numbers of each cause in a model that was fitted with all of them: path -> (value, unit)."""
     units = {parameter.path: parameter.unit for parameter in native.Instance.from_description(model.data).parameters()}
-    return tuple(_parameters(model, own, units) for own in added_paths(nominal, causes))
+    # those that were estimated, and all numbers of extensions
+    known = {*model.values, *(path for path in units if path.startswith("extensions["))}
+    return tuple(
+        {path: (float(get_number(model.data, path)), units[path]) for path in paths if path in known}
+        for paths in added_paths(nominal, causes)
+    )
 
 
 def extended_description(data: Mapping[str, Any], causes: Sequence[Term]) -> Mapping[str, Any]:
@@ -315,32 +309,18 @@ def extended_description(data: Mapping[str, Any], causes: Sequence[Term]) -> Map
 
 def added_paths(data: Mapping[str, Any], causes: Sequence[Term]) -> tuple[tuple[str, ...], ...]:
     """Return, for each cause, the paths of the numbers that it adds or replaces, in the description with all causes."""
-    added, before = [], _numbers_by_row(data)
+    added, before = [], _numbers_by_key(data)
     for cause in causes:
         data = cause.added_to(data)
-        after = _numbers_by_row(data)
+        after = _numbers_by_key(data)
         # a number that is only written differently does not belong to the cause
-        added.append([row for row, (_, value) in after.items() if row not in before or before[row][1] != value])
+        added.append([key for key, (_, value) in after.items() if key not in before or before[key][1] != value])
         before = after
-    return tuple(tuple(before[row][0] for row in rows if row in before) for rows in added)
+    return tuple(tuple(before[key][0] for key in keys if key in before) for keys in added)
 
 
-def _numbers_by_row(data: Data) -> dict[Any, tuple[str, float]]:
-    """Return (path, value) of all numbers; those of extensions by effect and place, since rows move."""
-    rows = [tuple(row.get(key) for key in PLACE) for row in extension_rows(data)]
-    found: dict[Any, tuple[str, float]] = {}
-    for path, value in _leaves(data):
-        place = re.match(r"extensions\[(\d+)\]", path)
-        k = 0 if place is None else int(place[1])
-        key: Any = (rows[k - 1], rows[: k - 1].count(rows[k - 1]), path[place.end() :]) if place else path
-        found[key] = (path, value)
-    return found
-
-
-def _parameters(model: FittedModel, paths: Sequence[str], units: Mapping[str, str]) -> dict[str, tuple[float, str]]:
-    """Return those of the paths that were estimated, and all numbers of extensions."""
-    own = (path for path in paths if path in model.values or (path in units and path.startswith("extensions[")))
-    return {path: (float(get_number(model.data, path)), units[path]) for path in own}
+def _numbers_by_key(data: Data) -> dict[Any, tuple[str, float]]:
+    return {key_of(data, path): (path, value) for path, value in _leaves(data)}
 
 
 # --- parts ------------------------------------------------------------------------------------------------------------
@@ -351,7 +331,8 @@ def possible(data: Mapping[str, Any], causes: Sequence[Term]) -> list[Term]:
     kept = []
     for cause in causes:
         path = changed_law(cause)
-        if needs_presliding(cause) and not any(row["effect"] == PRESLIDING for row in memory_of(data)):
+        alone = not any(row["effect"] == PRESLIDING for row in memory_of(data))
+        if cause.mechanism.name in (RELAXATION, CORDS) and alone:  # they are part of a memory that has presliding
             continue
         if path is None or any(effect.path == path for effect in effects(data)):
             data = cause.added_to(data)

@@ -24,13 +24,13 @@ from tendonfmu.statistics import BlockIndex, Interval, blocks_of, gain_interval,
 
 @dataclass(frozen=True)
 class Gain:
-    """Errors and gain of an extended model."""
+    """Errors and gain of an extended model: fields of `Diagnosis`."""
 
     nominal: ModelErrors  # rms per joint on the samples trained on and on those of the test
     extended: ModelErrors
     bias_only_rms: tuple[float, ...]
     delivered: tuple[ModelErrors, ModelErrors]  # the same with the bias, through the FMU: nominal, extended
-    value: Interval  # 1 − rms_extended/rms_nominal over all joints on the test
+    gain: Interval  # 1 − rms_extended/rms_nominal over all joints on the test
     steps: tuple[float, ...]  # rms over all joints on the test of each model of a sequence, N·m
     held_out: bool  # whether the test is held-out blocks of the training recordings
 
@@ -53,7 +53,7 @@ def measure_gain(
         extended=ModelErrors(trained.rms(extended), unseen.rms(extended)),
         bias_only_rms=unseen.rms(without_friction(extended)),
         delivered=(_delivered(nominal, training, tests), _delivered(extended, training, tests)),
-        value=unseen.gain(nominal, extended, seed, variance_between(pairs) / len(unseen.recordings)),
+        gain=unseen.gain(nominal, extended, seed, variance_between(pairs) / len(unseen.recordings)),
         steps=tuple(unseen.whole(data) for data in (nominal, *between, *([] if extended == nominal else [extended]))),
         held_out=not tests,
     )

@@ -16,7 +16,7 @@ import os
 import re
 import zlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import asdict, astuple, dataclass, replace
 from datetime import datetime, timezone
 from itertools import pairwise
 from pathlib import Path
@@ -27,7 +27,7 @@ import numpy as np
 from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.answer import Asked
 from tendonfmu.diagnosis.base import find_base
-from tendonfmu.diagnosis.change_diagnosis import sizes_now
+from tendonfmu.diagnosis.change_diagnosis import Changes
 from tendonfmu.diagnosis.diagnosis import LEAST_GAIN, diagnose
 from tendonfmu.diagnosis.effects import Where
 from tendonfmu.diagnosis.extension_fit import FitSettings
@@ -146,10 +146,10 @@ def diagnose_history(
     total = 2 * len(later)
     run_jobs(named_in, first, rows, client, progress=lambda done, _: progress(done, total))
     causes = rows_of(first, rows)
-    keys = sorted({tuple(key) for row in causes for key in json.loads(row.get("keys") or "[]")}, key=str)
+    keys = sorted({tuple(cause["where"]) for row in causes for cause in row.get("causes") or ()}, key=str)
     mark = _mark(keys)
     second = [
-        Job(f"{name}.sizes.{mark}", (*options, file, json.dumps(keys)))
+        Job(f"{name}.sizes.{mark}", (*options, file, keys))
         for name, file, row in zip(names, later, causes, strict=True)
         if keys and not row.get("error")
     ]
@@ -164,7 +164,8 @@ def diagnose_history(
         for job, row in zip(jobs, rows_of(jobs, rows), strict=True)
         if row.get("error")
     }
-    return _history(given.name, before, later, causes, sizes, failed)
+    known = [each for each in zip(later, causes, sizes, strict=True) if each[0] not in failed]
+    return _history(given.name, before, known, failed)
 
 
 def named_in(
@@ -174,105 +175,76 @@ def named_in(
     diagnosis = diagnose(
         finger, [recording], reference=reference, kinematics=kinematics, least_gain=least_gain, seed=seed
     )
-    causes = {key_text(cause.where): cause.gain.value for cause in diagnosis.causes}
-    return {
-        "recording": recording,
-        "verdict": diagnosis.verdict,
-        "keys": json.dumps([astuple(cause.where) for cause in diagnosis.causes]),
-        "gains": json.dumps(causes),
-        "titles": json.dumps({key_text(cause.where): cause.title for cause in diagnosis.causes}),
-    }
+    causes = [
+        {"where": astuple(cause.where), "title": cause.title, "gain": cause.gain.value} for cause in diagnosis.causes
+    ]
+    return {"recording": recording, "verdict": diagnosis.verdict, "causes": causes}
 
 
 def sizes_in(
-    finger: Finger, reference: Sequence[str], kinematics: int, least_gain: float, seed: int, recording: str, keys: str
+    finger: Finger,
+    reference: Sequence[str],
+    kinematics: int,
+    least_gain: float,
+    seed: int,
+    recording: str,
+    keys: Sequence[tuple[Any, ...]],
 ) -> dict[str, Any]:
     """Return a row: the sizes of these effects at these places in one recording, all of them free."""
     given = read_input(finger, [recording], [], reference, kinematics, least_gain, True)
     kinematic = find_kinematic_causes(given, least_gain, seed)
-    given, named = kinematic.corrected(given), [Where(*key) for key in json.loads(keys)]
+    given, named = kinematic.corrected(given), [Where(*key) for key in keys]
     settings = FitSettings(threads=1, path=given.finger.path)
     asked = Asked(given, 0.0, seed, settings, Phases({}))
     base = find_base(given.finger, given.reference, settings, least_gain)
-    sizes = sizes_now(asked, base, [key for key in named if key not in kinematic.known])
+    sizes = Changes(asked, base).sizes([key for key in named if key not in kinematic.known])
     sizes += [(key, kinematic.known[key].size) for key in named if key in kinematic.known]
-    return {"recording": recording, "sizes": json.dumps({key_text(where): _written(size) for where, size in sizes})}
+    listed = [{"where": astuple(where), **asdict(replace(size, by=()))} for where, size in sizes]
+    return {"recording": recording, "sizes": json.dumps(listed)}  # intervals may be infinite
 
 
-def key_text(where: Where) -> str:
-    return json.dumps(astuple(where))
-
-
-def _written(size: ChangedSize) -> dict[str, Any]:
-    ends = {name: getattr(size, name) for name in ("reference", "now", "change")}
-    return {
-        "number": size.number,
-        "unit": size.unit,
-        **{name: [end.value, end.low, end.high] for name, end in ends.items()},
-    }
-
-
-def _read(entry: dict[str, Any]) -> ChangedSize:
-    then, now, change = (Interval(*entry[name]) for name in ("reference", "now", "change"))
-    return ChangedSize(entry["number"], entry["unit"], then, now, change)
+Known = tuple[str, dict[str, Any], dict[str, Any]]  # a recording with its rows of causes and of sizes
 
 
 # --- put together -----------------------------------------------------------------------------------------------------
 
 
-def _history(
-    finger: str,
-    references: Sequence[str],
-    recordings: Sequence[str],
-    causes: Sequence[dict[str, Any]],
-    sizes: Sequence[dict[str, Any]],
-    failed: Mapping[str, str],
-) -> History:
-    kept = [k for k, recording in enumerate(recordings) if recording not in failed]
-    times, dated = times_of([*references, *(recordings[k] for k in kept)])
+def _history(finger: str, references: Sequence[str], known: Sequence[Known], failed: Mapping[str, str]) -> History:
+    recordings = [recording for recording, _, _ in known]
+    times, dated = times_of([*references, *recordings])
     times = times[len(references) :]
     if not dated:
-        times, dated = times_of([recordings[k] for k in kept])
-    titles: dict[str, str] = {}
-    for row in causes:
-        titles |= json.loads(row.get("titles") or "{}")
-    lines = [
-        _line(key, title, [recordings[k] for k in kept], [causes[k] for k in kept], [sizes[k] for k in kept], times)
-        for key, title in titles.items()
-    ]
+        times, dated = times_of(recordings)
+    titles = {tuple(cause["where"]): cause["title"] for _, row, _ in known for cause in row["causes"]}
+    lines = [_line(Where(*key), title, known, times) for key, title in titles.items()]
+
+    def importance(line: Line) -> tuple[int, float]:
+        return sum(size.named for size in line.sizes), max(size.gain for size in line.sizes)
+
     return History(
         finger=finger,
         references=tuple(references),
-        recordings=tuple(recordings[k] for k in kept),
+        recordings=tuple(recordings),
         times=times,
         dated=dated,
-        lines=tuple(sorted((line for line in lines if line.sizes), key=_importance, reverse=True)),
-        verdicts=tuple(str(causes[k]["verdict"]) for k in kept),
+        lines=tuple(sorted((line for line in lines if line.sizes), key=importance, reverse=True)),
+        verdicts=tuple(str(row["verdict"]) for _, row, _ in known),
         failed=tuple(failed.items()),
     )
 
 
-def _importance(line: Line) -> tuple[int, float]:
-    return sum(size.named for size in line.sizes), max(size.gain for size in line.sizes)
-
-
-def _line(
-    key: str,
-    title: str,
-    recordings: Sequence[str],
-    causes: Sequence[dict[str, Any]],
-    sizes: Sequence[dict[str, Any]],
-    times: Sequence[float],
-) -> Line:
-    listed, when = [], []
-    for recording, cause, row, time in zip(recordings, causes, sizes, times, strict=True):
-        entry = json.loads(row.get("sizes") or "{}").get(key)
-        if entry is not None:
-            gain = float(json.loads(cause.get("gains") or "{}").get(key, 0.0))
-            listed.append(Size(recording, _read(entry), gain > 0.0, gain))
-            when.append(time)
+def _line(where: Where, title: str, known: Sequence[Known], times: Sequence[float]) -> Line:
+    key, listed, when = list(astuple(where)), [], []
+    for (recording, causes, sizes), time in zip(known, times, strict=True):
+        for entry in json.loads(sizes.get("sizes") or "[]"):
+            if list(entry["where"]) == key:
+                gain = sum(cause["gain"] for cause in causes["causes"] if list(cause["where"]) == key)
+                then, now, change = (Interval(**entry[name]) for name in ("reference", "now", "change"))
+                size = ChangedSize(entry["number"], entry["unit"], then, now, change)
+                listed.append(Size(recording, size, gain > 0.0, gain))
+                when.append(time)
     trend = slope(np.array(when), [size.size.now for size in listed]) if len(listed) >= FEWEST else None
-    return Line(Where(*json.loads(key)), title, tuple(listed), trend, _since(listed))
+    return Line(where, title, tuple(listed), trend, _since(listed))
 
 
 def _since(sizes: Sequence[Size]) -> str | None:

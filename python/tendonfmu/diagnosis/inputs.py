@@ -175,9 +175,10 @@ def _rows(recording: FitRecording) -> Numbers:
 
 def _different_conditions(then: Sequence[FitRecording], now: Sequence[FitRecording]) -> Iterator[str]:
     """Yield warnings about new samples outside the range of the reference: no reference data exist for them."""
-    for name, unit, of in (("tendon force", "N", _force), ("joint angle", "rad", _angle)):
-        known = np.concatenate([of(recording) for recording in then])
-        new = np.concatenate([of(recording) for recording in now])
+    sides = [[(each, each.train | each.held_out) for each in side] for side in (then, now)]
+    forces = [np.concatenate([each.recording.groups["tendon_force"][used] for each, used in side]) for side in sides]
+    angles = [np.concatenate([each.model.joint_angle[used] for each, used in side]) for side in sides]
+    for name, unit, (known, new) in (("tendon force", "N", forces), ("joint angle", "rad", angles)):
         low, high = np.quantile(known, [0.005, 0.995], axis=0)
         outside = ((new < low) | (new > high)).mean(axis=0)
         worst = int(np.argmax(outside))
@@ -188,11 +189,3 @@ def _different_conditions(then: Sequence[FitRecording], now: Sequence[FitRecordi
                 f"{low[worst]:.3g} to {high[worst]:.3g} {unit} of the reference; there, an error of the model "
                 "cannot be distinguished from a change: record at the load and over the range of the reference"
             )
-
-
-def _force(recording: FitRecording) -> Numbers:
-    return np.asarray(recording.recording.groups["tendon_force"][recording.train | recording.held_out])
-
-
-def _angle(recording: FitRecording) -> Numbers:
-    return np.asarray(recording.model.joint_angle[recording.train | recording.held_out])

@@ -18,13 +18,13 @@ import numpy as np
 from scipy.special import ndtr
 
 from tendonfmu.arrays import Data, Numbers
-from tendonfmu.diagnosis.effects import Where
-from tendonfmu.diagnosis.effects.candidate import add_to_number, data_number
+from tendonfmu.diagnosis.effects import Where, title_of
+from tendonfmu.diagnosis.effects.mechanism import add_to_number, data_number
+from tendonfmu.diagnosis.effects.table import ENCODER, ZERO
 from tendonfmu.diagnosis.effects.words import NBSP, quantity
 from tendonfmu.diagnosis.inputs import Input
-from tendonfmu.diagnosis.names import ENCODER, ZERO, title_of
-from tendonfmu.diagnosis.result import Cause, CausePlace, ChangedSize, Diagnosis
-from tendonfmu.diagnosis.selection import SIGNIFICANCE, by_gain
+from tendonfmu.diagnosis.result import NO_GAIN, Cause, CausePlace, ChangedSize, Diagnosis, by_gain
+from tendonfmu.diagnosis.selection import SIGNIFICANCE
 from tendonfmu.diagnosis.tendon_equation import (
     ARM,
     COUPLING,
@@ -44,34 +44,18 @@ from tendonfmu.statistics import Interval
 
 
 EXPLANATIONS = {
-    ENCODER: (
-        "All tendons of this joint agree on another angle than its encoder reads: the encoder's disc or its coupling "
-        "has slipped, or it was set to zero in another pose. A description has no number for this: set the "
-        'encoder to zero again, or write its offset into the map of columns ("offset" at joint_position).'
-    ),
-    ZERO: (
-        "This tendon's motor reads another position than the joints and the other tendons show: the tendon has "
-        "slipped on its drum, was attached again, or its motor lost its count. The extended model has its zero."
-    ),
-    "moment_arm": (
-        "The tendon moves more or less per angle of this joint than described. Measure the pulley's radius and add "
-        "half the tendon's thickness; look whether the tendon runs on its pulley. The extended model has the arm."
-    ),
-    "tendon_nonlinearity": (
-        "The tendon stretches more or less under its force than described: another tendon, one that is worn, or the "
-        "gain of its force sensor. The extended model has the stiffness."
-    ),
-    "joint_coupling": (
-        "The tendon moves with a joint that it does not pass in the description: it passes beside the joint's axis. "
-        "The extended model has the moment arm."
-    ),
+    ENCODER: "All tendons of this joint agree on another angle than its encoder reads: the encoder's disc or its "
+    "coupling has slipped, or it was set to zero in another pose. A description has no number for this: set the "
+    'encoder to zero again, or write its offset into the map of columns ("offset" at joint_position).',
+    ZERO: "This tendon's motor reads another position than the joints and the other tendons show: the tendon has "
+    "slipped on its drum, was attached again, or its motor lost its count. The extended model has its zero.",
+    "moment_arm": "The tendon moves more or less per angle of this joint than described. Measure the pulley's radius "
+    "and add half the tendon's thickness; look whether the tendon runs on its pulley. The extended model has the arm.",
+    "tendon_nonlinearity": "The tendon stretches more or less under its force than described: another tendon, one "
+    "that is worn, or the gain of its force sensor. The extended model has the stiffness.",
+    "joint_coupling": "The tendon moves with a joint that it does not pass in the description: it passes beside the "
+    "joint's axis. The extended model has the moment arm.",
 }
-
-
-def size_of_all(effect: str, sizes: Sequence[ChangedSize], is_change: bool) -> str:
-    """Return the size of a cause in words, the largest first."""
-    where = f", at the largest of {len(sizes)} places" if len(sizes) > 1 else ""
-    return f"{_size(effect, sizes[0], is_change)}{where}"
 
 
 def _size(effect: str, size: ChangedSize, is_change: bool) -> str:
@@ -149,7 +133,10 @@ class KinematicCauses:
 
     def in_diagnosis(self, diagnosis: Diagnosis) -> Diagnosis:
         """Return the diagnosis of the corrected input with these causes."""
-        sentences = [*self._experiments(), diagnosis.experiment.sentence]
+        experiment = diagnosis.experiment
+        if self.causes:
+            sentences = [*self._experiments(), experiment.sentence]
+            experiment = replace(experiment, sentence=" ".join(filter(None, sentences)))
         extended = self.edited(diagnosis.extended_data) if self.is_change else diagnosis.extended_data
         verdicts = {"adequate": "explained", "unexplained": "partly explained"} if self.causes else {}
         return replace(
@@ -159,32 +146,20 @@ class KinematicCauses:
             too_small=(*self.too_small, *diagnosis.too_small),
             uncertain=(*self.uncertain, *diagnosis.uncertain),
             extended_data=extended,
-            experiment=replace(diagnosis.experiment, sentence=" ".join(filter(None, sentences)))
-            if self.causes
-            else diagnosis.experiment,
+            experiment=experiment,
             tested=diagnosis.tested + len(self.known),
             warnings=(*diagnosis.warnings, *self.warnings),
         )
 
     def _with_numbers(self, cause: Cause, extended: Data) -> Cause:
         """Return a cause with its numbers in the extended description; an encoder's offset is in none."""
-        places = tuple(
-            CausePlace(
-                off.where.joint,
-                off.where.tendon,
-                {
-                    off.number.path: (
-                        off.number.value if cause.effect == ENCODER else data_number(extended, off.number.path),
-                        off.unit,
-                    )
-                },
-            )
-            for off in self.off
-            if off.where.effect == cause.effect
-        )
-        numbers = {path: number for place in places for path, number in place.parameters.items()}
-        intervals = {off.number.path: off.size.now for off in self.off if off.number.path in numbers}
-        return replace(cause, places=places, parameters=numbers, intervals=intervals)
+
+        def value(off: Off) -> float:
+            return off.number.value if cause.effect == ENCODER else data_number(extended, off.number.path)
+
+        own = [off for off in self.off if off.where.effect == cause.effect]
+        places = tuple(CausePlace(*off.where.place, {off.number.path: (value(off), off.unit)}) for off in own)
+        return replace(cause, places=places, intervals={off.number.path: off.size.now for off in own})
 
     def _experiments(self) -> Iterator[str]:
         effects = {off.where.effect for off in self.off}
@@ -205,43 +180,36 @@ class KinematicCauses:
 
 def find_kinematic_causes(given: Input, least_gain: float, seed: int) -> KinematicCauses:
     """Find what is off in recordings that show it: with joint encoders, or with more tendons than joints."""
-    reference = [recording.recording for recording in given.reference]
+    data, reference = given.finger.data, [recording.recording for recording in given.reference]
     trained = [rows_of(recording.recording, recording.train) for recording in given.training]
-    is_long = True
     learned = learn_routing(given.finger, trained, reference, coupled=True)
-    if not learned:
-        is_long, whole = False, [recording.recording for recording in given.training]
+    is_long = bool(learned)
+    if not is_long:
+        whole = [recording.recording for recording in given.training]
         learned = learn_routing(given.finger, whole, reference, coupled=True)
     none = KinematicCauses(bool(reference))
-    known = {off.where: off for off in _listed(given.finger.data, learned)}
+    known = {off.where: off for off in _listed(data, learned)}
     if not learned or any(off.number.is_absurd for off in known.values() if off.where.effect != COUPLING):
         return none
-    offsets, single = _offsets(given.finger.data, known)
-    off = [each for each in known.values() if _is_certain(each, len(known)) and (each.where.effect != ZERO)]
-    off += [each for each in known.values() if each.where in single and _is_certain(each, len(known))]
-    off += [each for each in offsets if _is_certain(each, len(known))]
-    keys = known | {Where(ENCODER, j): each for j, each in _by_joint(given.finger.data, known)}
+    offsets, single = _offsets(data, known)
+    every = [each for each in known.values() if each.where.effect != ZERO]
+    every += [each for each in known.values() if each.where in single]
+    off = [each for each in (*every, *offsets) if _is_certain(each, len(known))]
+    keys = known | {each.where: each for each in _by_joint(data, known)}
     warnings = () if reference else tuple(varying_sentences(given.finger, learned))
     found = replace(none, known=keys, warnings=warnings)
-    if not is_long:
-        return replace(found, uncertain=tuple(_causes(given, found, off, known, lambda own: Interval(0.0, 0.0, 0.0))))
-    return _judged(given, found, off, known, learned, least_gain, seed)
+    if is_long:
+        return _judged(given, found, off, known, Unseen(given, learned, seed), least_gain)
+    return replace(found, uncertain=tuple(_causes(given, found, off, known, lambda own: NO_GAIN)))
 
 
 def _judged(
-    given: Input,
-    found: KinematicCauses,
-    off: Sequence[Off],
-    known: dict[Where, Off],
-    learned: Sequence[TendonRouting],
-    least_gain: float,
-    seed: int,
+    given: Input, found: KinematicCauses, off: Sequence[Off], known: dict[Where, Off], unseen: Unseen, least_gain: float
 ) -> KinematicCauses:
     """Divide what is off into causes and what is too small or uncertain."""
     small = [each for each in off if abs(each.number.off) < each.least]
     kept = [each for each in off if each not in small]
     base = Geometry.of(given.finger.data).as_reference(list(known.values()))
-    unseen = Unseen(given, learned, seed)
     while True:
         causes = list(_causes(given, found, kept, known, partial(unseen.gain, base, kept)))
         weak = {cause.effect for cause in causes if not (cause.gain.low > 0.0 and cause.gain.value >= least_gain)}
@@ -284,8 +252,7 @@ def _zero(routing: TendonRouting) -> tuple[Learned, float]:
     off = zero.off + force * (1.0 / spring.value - 1.0 / spring.described)
     if not spring.is_known or abs(off) >= abs(zero.off):
         return zero, 0.0
-    p_value = 2.0 * float(ndtr(-1.96 * abs(off) / max(zero.half, 1e-300)))
-    return replace(zero, value=zero.described + off, p_value=p_value), force
+    return replace(zero, value=zero.described + off, p_value=_p_value(off, zero.half)), force
 
 
 # --- zeros ------------------------------------------------------------------------------------------------------------
@@ -296,22 +263,20 @@ def _offsets(data: Data, known: dict[Where, Off]) -> tuple[list[Off], set[Where]
     zeros = _zeros(known)
     if not any(zero.number.differs for zero in zeros):
         return [], set()
-    off, known_to, arms = _of_zeros(data, zeros)
-    found = encoder_offsets(off, known_to, arms)
+    found = encoder_offsets(*_of_zeros(data, zeros))
     numbers = zip(found.joints.tolist(), found.offset.tolist(), found.half.tolist(), strict=True)
-    offsets = [_encoder(j, offset, half) for j, offset, half in numbers]
-    return offsets, {zero.where for zero, alone in zip(zeros, found.single, strict=True) if alone}
+    alone = {zero.where for zero, single in zip(zeros, found.single, strict=True) if single}
+    return [_encoder(j, offset, half) for j, offset, half in numbers], alone
 
 
-def _by_joint(data: Data, known: dict[Where, Off]) -> Iterator[tuple[int, Off]]:
-    """Yield (joint from 1, its encoder's offset if it explained the zeros alone)."""
-    zeros = _zeros(known)
-    if zeros:
+def _by_joint(data: Data, known: dict[Where, Off]) -> Iterator[Off]:
+    """Yield what each joint's encoder would be off by if it explained the zeros alone."""
+    if zeros := _zeros(known):
         off, known_to, arms = _of_zeros(data, zeros)
-        for j in np.flatnonzero(arms.any(axis=0)):
+        for j in np.flatnonzero(arms.any(axis=0)).tolist():
             own = arms[:, j] != 0.0
             offset, half = offset_of(off[own], known_to[own], arms[own][:, [j]])
-            yield int(j) + 1, _encoder(int(j), float(offset[0]), float(half[0]))
+            yield _encoder(j, float(offset[0]), float(half[0]))
 
 
 def _zeros(known: dict[Where, Off]) -> list[Off]:
@@ -320,15 +285,18 @@ def _zeros(known: dict[Where, Off]) -> list[Off]:
 
 def _of_zeros(data: Data, zeros: Sequence[Off]) -> tuple[Numbers, Numbers, Numbers]:
     """Return how far zeros are off, to what they are known (m) [t], and the arms of their tendons [t, n]."""
-    numbers = [zero.number for zero in zeros]
-    off, known_to = (np.array(values) for values in zip(*((each.off, each.known_to) for each in numbers), strict=True))
+    off, known_to = (np.array([getattr(zero.number, name) for zero in zeros]) for name in ("off", "known_to"))
     return off, known_to, moment_arms(data)[[(zero.where.tendon or 1) - 1 for zero in zeros]]
 
 
 def _encoder(j: int, offset: float, half: float) -> Off:
-    p_value = 2.0 * float(ndtr(-1.96 * abs(offset) / max(half, 1e-300)))
-    number = Learned(f"joint_position[{j + 1}]", offset, half, 0.0, True, 0.0, p_value)
+    number = Learned(f"joint_position[{j + 1}]", offset, half, 0.0, True, 0.0, _p_value(offset, half))
     return Off(Where(ENCODER, j + 1), number, LEAST_ANGLE)
+
+
+def _p_value(off: float, half: float) -> float:
+    """Return the p-value of a number that is off, from the half of its 95 % interval."""
+    return 2.0 * float(ndtr(-1.96 * abs(off) / max(half, 1e-300)))
 
 
 # --- causes -----------------------------------------------------------------------------------------------------------
@@ -348,6 +316,7 @@ def _causes(
         joints, tendons = ({getattr(each.where, name) for each in own} for name in ("joint", "tendon"))
         where = Where(effect, *(kind.pop() if len(kind) == 1 else None for kind in (joints, tendons)))
         rivals = dict.fromkeys(rival for each in own for rival in _rivals(each.where, arms))
+        at_largest = f", at the largest of {len(own)} places" if len(own) > 1 else ""
         yield Cause(
             where,
             title_of(effect),
@@ -356,8 +325,8 @@ def _causes(
             gain=gain_of(own),
             gain_unit="m",
             confusable_with=tuple(rivals),
-            size=size_of_all(effect, [each.size for each in own], found.is_change),
-            places=tuple(CausePlace(each.where.joint, each.where.tendon, {}) for each in own),
+            size=_size(effect, own[0].size, found.is_change) + at_largest,
+            places=tuple(CausePlace(*each.where.place, {}) for each in own),
             changed=own[0].size if found.is_change else None,
         )
 

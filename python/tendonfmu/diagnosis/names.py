@@ -9,22 +9,11 @@ import numpy as np
 
 from tendonfmu.arrays import Data
 from tendonfmu.diagnosis.contact_scan import LEVEL as SCAN_LEVEL
-from tendonfmu.diagnosis.effects import Where
-from tendonfmu.diagnosis.effects.table import BY_NAME
+from tendonfmu.diagnosis.effects import BY_NAME, Where, title_of
+from tendonfmu.diagnosis.effects.table import CONTACT, UNKNOWN
 from tendonfmu.diagnosis.effects.words import quantity
-from tendonfmu.diagnosis.result import Cause, Diagnosis
+from tendonfmu.diagnosis.result import Cause, CausePlace, Diagnosis, Parameters
 from tendonfmu.files import counted
-
-CONTACT, UNKNOWN = "contact", "unknown"
-ENCODER, ZERO = "encoder_offset", "zero"  # without a term in a model of torques
-LOAD = "load"  # a contact that lasts for the whole recording; only in a comparison with a reference
-TITLES = {
-    LOAD: "a new load on the finger, or a sensor's zero that has moved",
-    CONTACT: "something touches the finger, or stops it",
-    UNKNOWN: "something that no known effect explains",
-    ENCODER: "the joint's encoder is off",
-    ZERO: "the zero of a tendon's position is off",
-}
 
 
 @dataclass(frozen=True)
@@ -63,22 +52,74 @@ def names_in(data: Data) -> Names:
     return Names(*(tuple(str(part.get("name") or "") for part in parts) for parts in kinds))
 
 
-def title_of(effect: str) -> str:
-    """Describe an effect of docs/reference/commands/diagnose.md in a few plain words."""
-    if effect in BY_NAME:
-        return BY_NAME[effect].title
-    return TITLES.get(effect, effect.replace("_", " "))
-
-
 def at_place(title: str, where: Where, names: Names) -> str:
     """Add the place to a title, such as "friction grows with the force, at joint 1 (mcp)"."""
     place = names.place(where)
     return f"{title}, at {place}" if place else title
 
 
+# --- sizes ------------------------------------------------------------------------------------------------------------
+
+Thresholds = tuple[float, float]  # velocities of motion, of tendons and of joints
+_SHOWN = 3  # numbers that are listed for an effect without words of its own
+
+
+def size_of(effect: str, places: Sequence[CausePlace], thresholds: Thresholds) -> str:
+    """Return a size such as "a play of 0.32 mm"; for several places the largest one and their number."""
+    sized = [place for place in places if place.parameters]
+    if not sized:
+        return ""
+    sizes = list(dict.fromkeys(size_at(effect, place.parameters, thresholds) for place in sized))
+    if len(sized) == 1:
+        return sizes[0]
+    if len(sizes) == 1:
+        return f"{sizes[0]}, at each of {len(sized)} places"
+    units = {_first(place)[1] for place in sized}
+    if len(units) > 1:  # for example everywhere and at a joint
+        return f"{sizes[0]}; different at {counted(len(sized) - 1, 'place')}"
+    largest = max(sized, key=lambda place: abs(_first(place)[0]))
+    return f"{size_at(effect, largest.parameters, thresholds)} at the largest of {len(sized)} places"
+
+
+def size_at(effect: str, parameters: Parameters, thresholds: Thresholds) -> str:
+    """Return the size of an effect at one place in plain words."""
+    if effect == "presliding" and (sized := _travel(parameters, thresholds)):
+        return sized
+    numbers: dict[str, list[tuple[float, str]]] = {}
+    for path, number in parameters.items():
+        numbers.setdefault(path.rsplit(".", 1)[-1], []).append(number)
+    try:
+        return BY_NAME[effect].size(numbers)
+    except (KeyError, ValueError):  # it is given by other numbers, for example by a law instead of a row
+        return _listed(parameters)
+
+
+def _travel(parameters: Parameters, thresholds: Thresholds) -> str:
+    """Return the travel of presliding at all places, whose number is a time: time × threshold of motion."""
+    times = [value for path, (value, unit) in parameters.items() if path.endswith(".displacement") and unit == "s"]
+    if not times:
+        return ""
+    time = max(times)
+    tendon, joint = (quantity(time * threshold, unit) for threshold, unit in zip(thresholds, ("m", "rad"), strict=True))
+    return f"over {tendon} at tendons, {joint} at joints"
+
+
+def _first(place: CausePlace) -> tuple[float, str]:
+    return next(iter(place.parameters.values()))
+
+
+def _listed(parameters: Parameters) -> str:
+    """Return names and values of the first few numbers."""
+    names = [path.rsplit(".", 1)[-1].replace("_", " ") for path in parameters]
+    shown = [f"{name} {quantity(*number)}" for name, number in zip(names, parameters.values(), strict=True)]
+    more = len(shown) - _SHOWN
+    return ", ".join(shown[:_SHOWN]) + (f" and {more} more" if more > 0 else "")
+
+
 # --- causes that a report lists ---------------------------------------------------------------------------------------
 
 
+LOAD = "a new load on the finger, or a sensor's zero that has moved"  # a contact that lasts for the whole recording
 _EXPLANATIONS = {
     LOAD: "The mean torque that the model does not explain has moved far beyond its scatter in the reference. Friction "
     "cannot cause that. Check whether something touches or pulls the finger, and what the sensors read without a "
@@ -101,17 +142,16 @@ def _load(diagnosis: Diagnosis) -> Iterator[Cause]:
     load = diagnosis.load
     if load is None:
         return
-    size = load.size
+    change = load.size.change
     yield Cause(
-        where=Where(CONTACT, load.joint),
-        title=TITLES[LOAD],
-        explanation=_EXPLANATIONS[LOAD],
-        p_value=load.p_value,
-        gain=load.gain,
+        Where(CONTACT, load.joint),
+        LOAD,
+        _EXPLANATIONS[LOAD],
+        load.p_value,
+        load.gain,
         confusable_with=(Where("force_offset"), Where("gravity", load.joint)),
-        parameters={},
-        size=f"{quantity(size.change.value, size.unit, sign=True)} all the time",
-        changed=size,
+        size=f"{quantity(change.value, load.size.unit, sign=True)} all the time",
+        changed=load.size,
     )
 
 
@@ -121,32 +161,16 @@ def _contact(diagnosis: Diagnosis) -> Iterator[Cause]:
     if not events or gain is None or not gain.low >= LEAST_CONTACT:
         return
     joints = {joint for event in events for joint in event.joints}
-    joint = joints.pop() if len(joints) == 1 else None
+    where = Where(CONTACT, joints.pop() if len(joints) == 1 else None)
     count = "one event" if len(events) == 1 else f"{len(events)} events"
-    seconds = sum(event.end - event.start for event in events)
-    yield Cause(
-        where=Where(CONTACT, joint),
-        title=TITLES[CONTACT],
-        explanation=_EXPLANATIONS[CONTACT],
-        p_value=SCAN_LEVEL,  # probability of any event in recordings without one
-        gain=gain,
-        confusable_with=(),
-        parameters={},
-        size=f"{count}, {seconds:.1f} s in all",
-    )
+    size = f"{count}, {sum(event.end - event.start for event in events):.1f} s in all"
+    # p-value: the probability of any event in recordings without one
+    yield Cause(where, title_of(CONTACT), _EXPLANATIONS[CONTACT], SCAN_LEVEL, gain, size=size)
 
 
 def _unknown(diagnosis: Diagnosis) -> Iterator[Cause]:
     rest = diagnosis.unexplained
-    if not rest.unknown or not rest.gain.low > 0.0:
-        return
-    yield Cause(
-        where=Where(UNKNOWN, int(np.argmax(rest.by_joint)) + 1 if any(rest.by_joint) else None),
-        title=TITLES[UNKNOWN],
-        explanation=_EXPLANATIONS[UNKNOWN],
-        p_value=rest.p_value,
-        gain=rest.gain,
-        confusable_with=(),
-        parameters={},
-        size=rest.description.rstrip("."),
-    )
+    if rest.unknown and rest.gain.low > 0.0:
+        where = Where(UNKNOWN, int(np.argmax(rest.by_joint)) + 1 if any(rest.by_joint) else None)
+        size, words = rest.description.rstrip("."), _EXPLANATIONS[UNKNOWN]
+        yield Cause(where, title_of(UNKNOWN), words, rest.p_value, rest.gain, size=size)

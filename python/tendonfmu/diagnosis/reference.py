@@ -14,14 +14,16 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 from scipy.signal import correlate
 
 from tendonfmu.arrays import Array, Flags, Numbers
 from tendonfmu.diagnosis.candidate_columns import CandidateColumns
 from tendonfmu.diagnosis.remainder_features import Features, features
+from tendonfmu.diagnosis.result import ChangedSize, SteadyLoad, with_error
 from tendonfmu.diagnosis.samples import Series
 from tendonfmu.model import moment_arms
-from tendonfmu.statistics import Folds, make_folds
+from tendonfmu.statistics import Folds, gain_interval, make_folds
 
 GROUPS = (
     "angle",
@@ -57,7 +59,10 @@ def background_columns(
         parts.append(block)
         scales.append(np.full(len(own), USUAL * max(float(spread[joint]), 1e-300)))
     parts.append(columns.values)
-    scales.append(MISSING * float(spread.max()) / _sizes(columns, series))
+    deviation = (
+        columns.values[series.used].astype(np.float64).std(axis=0).max(axis=0, initial=0.0)
+    )  # where it is largest
+    scales.append(MISSING * float(spread.max()) / np.maximum(deviation, 1e-300))
     return np.concatenate(parts, axis=2), np.concatenate(scales)
 
 
@@ -68,12 +73,6 @@ def _of_joint(seen: Features, joint: int, arms: Numbers) -> NDArray[np.int64]:
     names.add("")  # several states together
     chosen = np.isin(seen.group, GROUPS) & np.isin(seen.subject, sorted(names))
     return np.asarray(np.flatnonzero(chosen), dtype=np.int64)
-
-
-def _sizes(columns: CandidateColumns, series: Series) -> Numbers:
-    """Return the standard deviation of each column at the joint where it is largest [c]."""
-    values = columns.values[series.used].astype(np.float64)
-    return np.asarray(np.maximum(values.std(axis=0).max(axis=0, initial=0.0), 1e-300))
 
 
 # --- repeated motions ------------------------------------------------------------------------------------------------
@@ -153,15 +152,14 @@ def _repeat(series: Series, force: Numbers, then: int, now: int) -> Repeat | Non
         if (
             moves.any()
             and (apart[moves] <= SAME_ANGLES * spread[moves]).all()
-            and _same_load(force, rows, begin, end, lag)
+            and _same_load(force[rows[0]][begin:end], force[rows[1]][begin + lag : end + lag])
         ):
             shift = float(time[1][begin + lag] - time[0][begin])
             return Repeat(then, now, shift, float(time[0][begin]), float(time[0][end - 1]))
     return None
 
 
-def _same_load(force: Numbers, rows: Sequence[Flags], begin: int, end: int, lag: int) -> bool:
-    one, other = force[rows[0]][begin:end], force[rows[1]][begin + lag : end + lag]
+def _same_load(one: Numbers, other: Numbers) -> bool:
     apart = np.sqrt(np.mean((one - other) ** 2, axis=0))
     return bool((apart <= SAME_FORCES * np.sqrt(np.mean(one**2, axis=0))).all())
 
@@ -177,6 +175,71 @@ def _lags(one: Numbers, other: Numbers, fewest: int) -> Iterator[int]:
     for a, b in zip(one.T, other.T, strict=True):
         apart -= 2.0 * correlate(b, a, method="fft")
     yield int(lags[np.argmin(np.where(end - begin >= fewest, apart / (end - begin), np.inf))])
+
+
+# --- a steady load ----------------------------------------------------------------------------------------------------
+
+
+BEYOND = 2.0  # times what the reference itself leaves about its level, or the distance between its recordings
+OTHER_SIDE = 0.01  # largest share of stretches whose mean is on the other side
+
+
+def steady_load(series: Series, left: Numbers, is_now: Flags, seed: int = 0) -> SteadyLoad | None:
+    """Return the load at the joint where it is largest; None if no level moved beyond the reference's scatter."""
+    sides = [make_folds(replace(series, used=series.used & side)) for side in (~is_now, is_now)]
+    if min(folds.stretches for folds in sides) < 2:
+        return None
+    then, now = ([_Side.of(series, values, folds) for values in left.T] for folds in sides)
+    pairs = enumerate(zip(then, now, strict=True))
+    loads = [load for joint, (one, other) in pairs if (load := _at(joint, one, other, seed)) is not None]
+    best = max(loads, key=lambda load: abs(load.size.change.value), default=None)
+    return best and replace(best, p_value=min(1.0, best.p_value * left.shape[1]))
+
+
+@dataclass(frozen=True)
+class _Side:
+    """The mean torque of one side."""
+
+    level: float  # mean, N·m
+    spread: float  # rms about the level, N·m
+    apart: float  # largest distance of a recording's mean from the level, N·m
+    means: Numbers  # by stretch of 2 s
+    squares: Numbers
+    counts: Numbers
+
+    @staticmethod
+    def of(series: Series, values: Numbers, folds: Folds) -> _Side:
+        own, recording = values[folds.rows], series.recording[folds.rows]
+        level = float(own.mean())
+        apart = max(abs(float(own[recording == k].mean()) - level) for k in np.unique(recording))
+        counts = np.bincount(folds.stretch, minlength=folds.stretches).astype(np.float64)
+        sums, squares = (np.bincount(folds.stretch, own**k, minlength=folds.stretches) for k in (1, 2))
+        return _Side(level, float(own.std()), apart, np.asarray(sums / counts), np.asarray(squares), counts)
+
+    @property
+    def error(self) -> float:
+        """Standard error of the level."""
+        return float(np.std(self.means, ddof=1) / np.sqrt(len(self.means)))
+
+    def about(self, level: float) -> Numbers:
+        """Return Σ (x − level)² by stretch [K]."""
+        return np.asarray(self.squares - 2.0 * level * self.means * self.counts + level**2 * self.counts)
+
+
+def _at(joint: int, then: _Side, now: _Side, seed: int) -> SteadyLoad | None:
+    moved = now.level - then.level
+    if abs(moved) <= BEYOND * max(then.spread, then.apart):
+        return None
+    if float(np.mean(np.sign(now.means - then.level) != np.sign(moved))) > OTHER_SIDE:
+        return None
+    gain = gain_interval(now.about(then.level), now.about(now.level), seed)
+    if not gain.low > 0.0:  # NaN where too little is left to say
+        return None
+    error = float(np.hypot(then.error, now.error))
+    levels = (with_error(then.level, then.error), with_error(now.level, now.error), with_error(moved, error))
+    size = ChangedSize("torque", "N.m", *levels)
+    p_value = float(stats.ttest_ind(then.means, now.means, equal_var=False).pvalue)
+    return SteadyLoad(joint + 1, size, gain, p_value)
 
 
 # --- parts ------------------------------------------------------------------------------------------------------------

@@ -23,7 +23,6 @@ from tendonfmu.diagnosis.remainder_features import (
     GROUPS,
     LAW,
     Features,
-    Finding,
     features,
     planted,
     run_starts,
@@ -32,7 +31,8 @@ from tendonfmu.diagnosis.remainder_features import (
 from tendonfmu.diagnosis.remainder_learner import Learner
 from tendonfmu.diagnosis.result import RemainderMap, Unexplained
 from tendonfmu.diagnosis.samples import Series
-from tendonfmu.statistics import Interval, Splines, Whitener, find_lines, make_folds, standard_error, whitener
+from tendonfmu.files import listed
+from tendonfmu.statistics import Interval, Line, Splines, Whitener, find_lines, make_folds, standard_error, whitener
 
 LEVEL = 0.01  # probability of a wrong "unknown", family-wise
 LEAST_SHARE = 0.02  # of the residual's variance: smaller parts are not reported
@@ -40,6 +40,16 @@ STRONG = 0.1  # of the variance, of a line in signals that are not whitened
 CERTAIN = 2.0  # standard errors over the stretches
 LAW_ERROR = 0.1  # of the torque to be explained: laws of friction differ from each other by no more
 CONCENTRATED = 1.6  # times as much of the prediction's power as of the time, to report a concentration
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One part of the remainder."""
+
+    joint: int  # number from 1
+    group: str  # key of GROUPS, or "line"
+    subject: str  # "joint 2", "tendons 1 and 3", or ""
+    line: Line | None = None  # the oscillation, for group "line"
 
 
 @dataclass(frozen=True)
@@ -74,14 +84,12 @@ def measure_remainder(
         return Remainder((0.0,) * joints, nothing, nothing, np.zeros(joints), 1.0, "", np.zeros_like(residual), ())
     seen = features(series, force=force, torque=torque, seed=seed, elastic=True)
     learner = Learner(seen, residual, splines, folds)
-    everything, law = _predicted(
-        learner, seen, tree_states(series, series.force if force is None else force, torque), seed
-    )
-    prediction, law_alone, findings, p_values = np.zeros_like(residual), np.zeros_like(learner.target), [], []
+    states = tree_states(series, series.force if force is None else force, torque)
+    everything, law = _predicted(learner, seen, states, seed)
+    prediction, law_alone, findings = np.zeros_like(residual), np.zeros_like(learner.target), list[Finding]()
+    gains = learner.gains(everything).T
     for joint in range(joints):
-        gain = learner.gains(everything)[:, joint]
-        p_values.append(_p_value(gain))
-        if _is_certain(gain):
+        if _is_certain(gains[joint]):
             prediction[folds.rows, joint] = everything[:, joint]
             law_alone[:, joint] = law[:, joint]
     large = [_share(learner.target[:, j], prediction[folds.rows, j]) >= LEAST_SHARE for j in range(joints)]
@@ -89,7 +97,7 @@ def measure_remainder(
         named = _named(learner, seen)
         findings += [Finding(j + 1, *named[j]) for j in range(joints) if large[j]]
     lines = _lines(series, residual, prediction, findings)
-    p_value = min([1.0, *(joints * p_value for p_value in p_values), *lines])
+    p_value = min([1.0, *(joints * _p_value(gain) for gain in gains), *lines])
     gain = learner.gains(prediction[folds.rows])
     share = tuple(_share(learner.target[:, j], prediction[folds.rows, j]) for j in range(joints))
     certain = [finding for finding in findings if share[finding.joint - 1] >= LEAST_SHARE]
@@ -148,9 +156,7 @@ def _share(target: Numbers, prediction: Numbers) -> float:
 
 def _p_value(gain: Numbers) -> float:
     """Return the p-value of gains by stretch [K]: a one-sided t test."""
-    if not np.any(gain):
-        return 1.0
-    return float(ttest_1samp(gain, 0.0, alternative="greater").pvalue)
+    return float(ttest_1samp(gain, 0.0, alternative="greater").pvalue) if np.any(gain) else 1.0
 
 
 def _named(learner: Learner, seen: Features) -> list[tuple[str, str]]:
@@ -207,27 +213,14 @@ def _part(share: float) -> str:
 def _what(findings: Sequence[Finding]) -> Iterator[str]:
     """Yield what each finding follows; all oscillations are listed together, at the first one."""
     lines = [finding.line for finding in findings if finding.line is not None]
-    mentioned = False
+    frequencies = listed([f"{line.frequency:.3g}" for line in lines])
+    sizes = listed([f"{1000.0 * line.amplitude:.2g}" for line in lines])
+    steady = "a steady oscillation" if len(lines) == 1 else "steady oscillations"
     for finding in findings:
-        if finding.line is None:
-            subject = f", {finding.subject}" if finding.subject else ""
-            yield f"{GROUPS[finding.group]}{subject}"
-        elif not mentioned:
-            mentioned = True
-            frequencies, sizes = (
-                _listed([f"{value:.{digits}g}" for value in values])
-                for values, digits in (
-                    ([line.frequency for line in lines], 3),
-                    ([1000.0 * line.amplitude for line in lines], 2),
-                )
-            )
-            steady = "a steady oscillation" if len(lines) == 1 else "steady oscillations"
+        if finding.line is not None:
             yield f"{steady} at {frequencies} Hz of {sizes} mN·m, independent of the motion"
-
-
-def _listed(values: Sequence[str]) -> str:
-    """Join values as in "1, 2 and 3"."""
-    return " and ".join(filter(None, [", ".join(values[:-1]), values[-1]]))
+        else:
+            yield f"{GROUPS[finding.group]}{f', {finding.subject}' if finding.subject else ''}"
 
 
 def _where(series: Series, part: Numbers, joint: int, findings: Sequence[Finding]) -> str:

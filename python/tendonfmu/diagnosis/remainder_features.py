@@ -18,7 +18,6 @@ from scipy.signal import lfilter
 
 from tendonfmu.arrays import Indices, Numbers
 from tendonfmu.recordings import stopped
-from tendonfmu.statistics import Line
 
 if TYPE_CHECKING:
     from tendonfmu.diagnosis.samples import Series
@@ -42,8 +41,7 @@ def states_of(series: Series, starts: Indices) -> Iterator[tuple[str, Numbers]]:
     moved = np.repeat(np.stack([driver for _, driver, _ in drivers], axis=1), count, axis=1)
     states = stopped(moved, np.tile(widths, len(drivers)), np.tile(times, len(drivers)), series.step, starts)
     for k, (who, _, load) in enumerate(drivers):
-        own = states[:, k * count : (k + 1) * count]
-        yield who, own if load is None else own * load[:, None]
+        yield who, states[:, k * count : (k + 1) * count] * load[:, None]
 
 
 def planted(series: Series, starts: Indices, random: np.random.Generator) -> Numbers:
@@ -53,22 +51,19 @@ def planted(series: Series, starts: Indices, random: np.random.Generator) -> Num
     widths = np.exp(random.uniform(np.log(WIDTHS[0]), np.log(WIDTHS[-1]), PLANTED))
     times = np.where(random.random(PLANTED) < 0.5, np.inf, np.exp(random.uniform(np.log(0.05), np.log(3.0), PLANTED)))
     states = stopped(np.stack([drivers[k][1] for k in chosen], axis=1), widths, times, series.step, starts)
-    loads = [drivers[k][2] for k in chosen]
-    return np.stack(
-        [state if load is None else state * load for state, load in zip(states.T, loads, strict=True)], axis=1
-    )
+    return np.asarray(states * np.stack([drivers[k][2] for k in chosen], axis=1))
 
 
-def _drivers(series: Series) -> Iterator[tuple[str, Numbers, Numbers | None]]:
-    """Yield (name, travel or force [B] in ranges, tendon force that the state presses with [B] or None)."""
+def _drivers(series: Series) -> Iterator[tuple[str, Numbers, Numbers]]:
+    """Yield (name, travel or force [B] in ranges, tendon force that presses it, over its mean [B]; ones without)."""
+    alone = np.ones(len(series.time))
     for joint, angle in enumerate(series.angle.T):
-        yield f"joint {joint + 1}", _in_ranges(angle), None
+        yield f"joint {joint + 1}", _in_ranges(angle), alone
     level = np.maximum(np.abs(series.force).mean(axis=0), 1e-12)
     travel = np.cumsum(series.tendon_velocity[:, :, 0], axis=0) * series.step
     for tendon in range(series.force.shape[1]):
-        load = series.force[:, tendon] / level[tendon]
-        yield f"tendon {tendon + 1}", _in_ranges(travel[:, tendon]), load
-        yield f"force of tendon {tendon + 1}", _in_ranges(series.force[:, tendon]), None
+        yield f"tendon {tendon + 1}", _in_ranges(travel[:, tendon]), series.force[:, tendon] / level[tendon]
+        yield f"force of tendon {tendon + 1}", _in_ranges(series.force[:, tendon]), alone
 
 
 def _in_ranges(values: Numbers) -> Numbers:
@@ -81,16 +76,6 @@ TRAVELS = (0.03, 0.1, 0.3, 1.0)  # scales of presliding, of the median stroke
 MOST_PAIRS = 30  # of tendons: those with neighbouring numbers first
 RANDOM = 100  # columns of random functions of two or three states
 MOVING = 0.03  # of the 95 % quantile of a speed: slower motion counts as rest
-
-
-@dataclass(frozen=True)
-class Finding:
-    """One part of the remainder."""
-
-    joint: int  # number from 1
-    group: str  # key of GROUPS, or "line"
-    subject: str  # "joint 2", "tendons 1 and 3", or ""
-    line: Line | None = None  # the oscillation, for group "line"
 
 
 @dataclass(frozen=True)
@@ -134,51 +119,34 @@ def features(
     """Compute all columns for the blocks of a series, standardised; constant columns are left out."""
     # torque: of the model, N·m [B, n]; a measured torque or force would carry the residual
     series = replace(series, force=_without_torque(series) if force is None else force)
-    columns: list[Numbers] = []
-    group: list[str] = []
-    subject: list[str] = []
     states = _states(series)
-    for maker in (
-        _of_angles,
-        _of_velocities,
-        _of_forces,
-        _of_accelerations,
-        _of_memory,
-        *((_of_states,) if elastic else ()),
-        _of_slides,
-        _of_time,
-        _of_tendons,
-    ):
-        for name, who, values in maker(series, states):
-            columns.append(values)
-            group += [name] * values.shape[1]
-            subject += [who] * values.shape[1]
+    motion = (_of_angles, _of_velocities, _of_forces, _of_accelerations, _of_memory)
+    makers = [*motion, *([_of_states] if elastic else []), _of_slides, _of_time, _of_tendons]
+    made = [columns for maker in makers for columns in maker(series, states)]
     for joint, values in enumerate(() if torque is None else torque.T):
-        columns.append(np.stack([values, np.abs(values), values * states.side[:, joint]], axis=1))
-        group += ["torque"] * 3
-        subject += [_joint(joint)] * 3
-    values = _interactions(series, states, np.random.default_rng(seed))
-    columns.append(values)
-    group += ["interaction"] * values.shape[1]
-    subject += [""] * values.shape[1]
-    table = np.concatenate(columns, axis=1)
+        own = np.stack([values, np.abs(values), values * states.side[:, joint]], axis=1)
+        made.append(("torque", _joint(joint), own))
+    made.append(("interaction", "", _interactions(series, states, np.random.default_rng(seed))))
+    table = np.concatenate([values for _, _, values in made], axis=1)
+    counts = [values.shape[1] for _, _, values in made]
+    group, subject = (np.repeat([columns[k] for columns in made], counts) for k in (0, 1))
     table -= table.mean(axis=0)
     spread = table.std(axis=0)
     kept = spread > 1e-9 * max(1.0, float(spread.max(initial=0.0)))
-    return Features(table[:, kept] / spread[kept], np.array(group)[kept], np.array(subject)[kept])
+    return Features(table[:, kept] / spread[kept], group[kept], subject[kept])
 
 
 def tree_states(series: Series, force: Numbers, torque: Numbers | None = None) -> tuple[Numbers, Numbers]:
     """Return all recorded signals and their history [B, f], and those of them that a friction law depends on."""
-    states, starts = _states(series), run_starts(series.segment)
+    states = _states(series)
     ratio = series.velocity / states.speed
     law = [ratio, states.side, states.moving, states.rest, series.travel]
     law += [states.side[:, joint, None] * force for joint in range(ratio.shape[1])]
     others = [series.angle, force, series.time[:, None], *([] if torque is None else [torque])]
     for memory in HISTORY:
-        others.append(_filtered(states.side, memory, series.step, starts))
-        others.append(_filtered(np.abs(ratio), memory, series.step, starts))
-        others.append(series.angle - _filtered(series.angle - series.angle[0], memory, series.step, starts))
+        others.append(_filtered(states.side, memory, series.step, states.starts))
+        others.append(_filtered(np.abs(ratio), memory, series.step, states.starts))
+        others.append(series.angle - _filtered(series.angle - series.angle[0], memory, series.step, states.starts))
     own = np.concatenate(law, axis=1)
     return np.concatenate([own, *others], axis=1), own
 
@@ -201,23 +169,19 @@ class _States:
     rest: Numbers  # length of the last rest, s [B, n]
     speed: Numbers  # 95 % quantile of |velocity|, rad/s [n]
     tendon_speed: Numbers  # the same of the tendon's velocity at its first joint, m/s [m]
+    starts: Indices  # first block of each stretch without a gap, and B
 
 
 _Made = Iterator[tuple[str, str, Numbers]]
 
 
 def _states(series: Series) -> _States:
-    speed = np.maximum(np.quantile(np.abs(series.velocity), 0.95, axis=0), 1e-12)
-    whole = series.tendon_velocity[:, :, 0]
-    tendon_speed = np.maximum(np.quantile(np.abs(whole), 0.95, axis=0), 1e-15)
-    starts = run_starts(series.segment)
-    return _States(
-        side=_last_side(series.velocity, MOVING * speed, starts),
-        moving=np.tanh(series.velocity / (MOVING * speed)),
-        rest=_rest_before(series.velocity, MOVING * speed, series.step, starts),
-        speed=speed,
-        tendon_speed=tendon_speed,
-    )
+    velocity, starts = series.velocity, run_starts(series.segment)
+    speed = np.maximum(np.quantile(np.abs(velocity), 0.95, axis=0), 1e-12)
+    tendon_speed = np.maximum(np.quantile(np.abs(series.tendon_velocity[:, :, 0]), 0.95, axis=0), 1e-15)
+    slow = MOVING * speed
+    side, rest = _last_side(velocity, slow, starts), _rest_before(velocity, slow, series.step, starts)
+    return _States(side, np.tanh(velocity / slow), rest, speed, tendon_speed, starts)
 
 
 def run_starts(label: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -229,10 +193,8 @@ def _last_side(velocity: Numbers, threshold: Numbers, starts: NDArray[np.int64])
     """Return the sign of the last motion faster than the threshold [B, k]."""
     moving = np.abs(velocity) > threshold
     index = np.where(moving, np.arange(len(velocity))[:, None], -1)
-    index[starts[:-1]] = np.where(moving[starts[:-1]], index[starts[:-1]], -1)
     last = np.maximum.accumulate(index, axis=0)
-    begin = np.repeat(starts[:-1], np.diff(starts))[:, None]
-    known = last >= begin
+    known = last >= np.repeat(starts[:-1], np.diff(starts))[:, None]
     return np.where(known, np.sign(np.take_along_axis(velocity, np.maximum(last, 0), axis=0)), 0.0)
 
 
@@ -332,53 +294,51 @@ def _of_forces(series: Series, states: _States) -> _Made:
 def _of_accelerations(series: Series, states: _States) -> _Made:
     joints = series.velocity.shape[1]
     for joint in range(joints):
-        yield "acceleration", _joint(joint), series.acceleration[:, joint : joint + 1]
-        around = np.cos(series.angle[:, joint]) * series.acceleration[:, joint]
-        yield "acceleration", _joint(joint), around[:, None]
+        own = series.acceleration[:, joint]
+        yield "acceleration", _joint(joint), np.stack([own, np.cos(series.angle[:, joint]) * own], axis=1)
     for one, two in combinations(range(joints), 2):
         product = series.velocity[:, one] * series.velocity[:, two] / (states.speed[one] * states.speed[two])
         yield "acceleration", f"joints {one + 1} and {two + 1}", product[:, None]
 
 
 def _of_memory(series: Series, states: _States) -> _Made:
-    starts = run_starts(series.segment)
+    starts, step = states.starts, series.step
     for joint in range(series.velocity.shape[1]):
-        travel = np.abs(series.travel[:, joint])
+        travel, side, moving = np.abs(series.travel[:, joint]), states.side[:, joint], states.moving[:, joint]
         stroke = max(float(np.quantile(travel, 0.9)), 1e-12)
-        side, moving = states.side[:, joint], states.moving[:, joint]
         decays = [side * np.exp(-travel / (scale * stroke)) for scale in TRAVELS]
         yield "travel", _joint(joint), np.stack(decays, axis=1)
         signals = np.stack([side, np.abs(series.velocity[:, joint]) / states.speed[joint]], axis=1)
-        past = np.stack([_filtered(signals, memory, series.step, starts) for memory in MEMORY], axis=2)
+        past = np.stack([_filtered(signals, memory, step, starts) for memory in MEMORY], axis=2)
         yield "memory of direction", _joint(joint), past[:, 0]
         quick = [past[:, 1] * side[:, None], past[:, 1] * moving[:, None]]
         yield "memory of speed", _joint(joint), np.concatenate(quick, axis=1)
         angle = series.angle[:, joint, None] - series.angle[:, joint].mean()
-        kept = [angle - _filtered(angle, memory, series.step, starts) for memory in MEMORY[:5]]
+        kept = [angle - _filtered(angle, memory, step, starts) for memory in MEMORY[:5]]
         yield "memory of angle", _joint(joint), np.concatenate(kept, axis=1)
         rested = np.log1p(states.rest[:, joint] / 0.1)
-        fresh = np.exp(-travel / (0.3 * stroke))
-        columns = [rested, rested * side, rested * moving, rested * side * fresh]
+        columns = [rested, rested * side, rested * moving, rested * side * np.exp(-travel / (0.3 * stroke))]
         yield "rest", _joint(joint), np.stack(columns, axis=1)
 
 
 def _of_states(series: Series, states: _States) -> _Made:
-    for who, values in states_of(series, run_starts(series.segment)):
+    for who, values in states_of(series, states.starts):
         yield "memory of angle" if who.startswith("joint") else "elastic", who, values
 
 
 def _of_slides(series: Series, states: _States) -> _Made:
     """Yield columns for friction of a tendon that depends on how much and how fast it slid recently."""
-    starts = run_starts(series.segment)
     level = np.abs(series.force).mean(axis=0)
     for tendon in range(series.force.shape[1]):
         load = np.abs(series.force[:, tendon]) / level[tendon] if level[tendon] > 0.0 else np.ones(len(series.time))
         slip = series.tendon_velocity[:, tendon]
         ratio = np.abs(slip[:, 0]) / states.tendon_speed[tendon]
         signals = np.stack([np.minimum(ratio / 0.2, 1.0), ratio], axis=1)
-        past = np.concatenate([_filtered(signals, memory, series.step, starts) for memory in MEMORY[2:5]], axis=1)
+        past = np.concatenate(
+            [_filtered(signals, memory, series.step, states.starts) for memory in MEMORY[2:5]], axis=1
+        )
         past -= past.mean(axis=0)
-        side = _last_side(slip, np.full(slip.shape[1], MOVING * states.tendon_speed[tendon]), starts)
+        side = _last_side(slip, np.full(slip.shape[1], MOVING * states.tendon_speed[tendon]), states.starts)
         columns = [past * (load * side[:, joint])[:, None] for joint in range(slip.shape[1])]
         yield "memory of speed", f"tendon {tendon + 1}", np.concatenate(columns, axis=1)
 
@@ -416,9 +376,8 @@ def _of_tendons(series: Series, states: _States) -> _Made:
 
 def _interactions(series: Series, states: _States, rng: np.random.Generator) -> Numbers:
     """Return random waves of two or three states at a time, half of them with the sign of a motion."""
-    starts = run_starts(series.segment)
     ratio = series.velocity / states.speed
-    recent = [_filtered(states.side, memory, series.step, starts) for memory in (0.3, 3.0)]
+    recent = [_filtered(states.side, memory, series.step, states.starts) for memory in (0.3, 3.0)]
     table = np.concatenate(
         [series.angle, np.sign(ratio) * np.sqrt(np.abs(ratio)), series.force, np.abs(series.travel), *recent], axis=1
     )

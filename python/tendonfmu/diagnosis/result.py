@@ -3,30 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
-
-import numpy as np
+from typing import Any, TypeVar
 
 from tendonfmu.arrays import Numbers
-from tendonfmu.diagnosis.effects import Term, Where
+from tendonfmu.diagnosis.effects import Where
 from tendonfmu.diagnosis.effects.words import off_by
 from tendonfmu.statistics import Interval
 
 # --- causes -----------------------------------------------------------------------------------------------------------
-# 1. A candidate has a place, its terms in a description and its direction in the columns (`candidate_columns`).
-# 2. Judged, it has magnitudes and its error on unseen stretches (`selection`).
-# 3. Named, it has a p-value, a gain, and the causes that the data cannot distinguish from it (`search`,
-#    `change_search`).
-# 4. Confirmed, its gain is that on unseen data, and every place has its numbers (`extension_diagnosis`,
-#    `change_diagnosis`).
-# 5. Reported, it has its size in words and its pictures (`answer`).
 
 
 Parameters = Mapping[str, tuple[float, str]]  # path of a number in the description -> (value, unit)
 
-EVERYWHERE, SOMEWHERE, HERE = 0, 1, 2  # levels: all places, those of one joint or tendon, a single one
 NO_GAIN = Interval(0.0, 0.0, 0.0)
 
 
@@ -86,85 +76,27 @@ class Sensor:
         return off_by(self.where.effect, *self.where.place, self.correction, self.unit)
 
 
-@dataclass(frozen=True)
-class Direction:
-    """How a cause looks among all columns: what its magnitudes add."""
-
-    mix: Numbers  # map from magnitudes to columns [c, d]
-    low: Numbers  # bounds of the magnitudes [d]
-    high: Numbers
-    level: int = HERE  # EVERYWHERE, SOMEWHERE or HERE
-    ordinary: Numbers = field(default_factory=lambda: np.zeros(0))  # magnitudes of an ordinary effect at one place [d]
-    step: float = 1.0  # size of its first number at a magnitude of 1, in the unit of the number
-    least_gain: float = 0.0  # share of the rms that it must remove to be considered
-
-
-_NOWHERE = Direction(np.zeros((0, 0)), np.zeros(0), np.zeros(0))
-
-
 @dataclass(frozen=True, repr=False)
 class Cause:
-    """An effect that was found, at one place or several.
+    """An effect that was found, at one place or several, with its numbers."""
 
-    Attributes
-    ----------
-    where
-        Effect and place; None everywhere or at several places.
-    title, explanation
-        The effect in plain words, and what to look at on the hand.
-    p_value
-        Family-wise, over all effects and places that were tested.
-    gain
-        Of this cause alone on unseen data: 1 − rms with / rms without, the other causes kept.
-    gain_unit
-        Of the rms: "N.m" of the torque; "m" of the tendons' positions, of numbers that lead from angles to them.
-    confusable_with
-        What the data cannot distinguish from it.
-    parameters
-        Its numbers in the extended description, of all places: path -> (value, unit).
-    intervals
-        95 % intervals of those that the data determine, by path.
-    size
-        In plain words with physical units.
-    places
-        Every place of the cause with its numbers.
-    evidence
-        Pictures of the residual with and without the cause.
-    changed
-        For a change: the size in the reference and now.
-    experiment
-        Of an uncertain cause: the recording that would settle it.
-    sensors
-        Of `calibration`: by how much each sensor is off.
-    """
-
-    where: Where
-    title: str = ""
+    where: Where  # effect and place; None everywhere or at several places
+    title: str = ""  # the effect in plain words, and what to look at on the hand
     explanation: str = ""
-    p_value: float = 1.0
-    gain: Interval = NO_GAIN
-    gain_unit: str = "N.m"
-    confusable_with: tuple[Where, ...] = ()
-    parameters: Parameters = field(default_factory=dict)
-    intervals: Mapping[str, Interval] = field(default_factory=dict)
-    size: str = ""
-    places: tuple[CausePlace, ...] = ()
-    evidence: tuple[Evidence, ...] = ()
-    changed: ChangedSize | None = None
-    experiment: str = ""
-    sensors: tuple[Sensor, ...] = ()
-    # what it adds to a description, place by place; of a candidate, for magnitudes of 1; none for a number of its own
-    terms: tuple[Term, ...] = ()
-    direction: Direction = field(default=_NOWHERE, compare=False)
-    magnitudes: Numbers = field(default_factory=lambda: np.zeros(0), compare=False)  # [d], and [d, d]
-    covariance: Numbers = field(default_factory=lambda: np.zeros((0, 0)), compare=False)
-    unseen: Numbers = field(default_factory=lambda: np.zeros(0), compare=False)  # Σ e² by stretch, (N·m)²
-    alike: tuple[Cause, ...] = field(default=(), compare=False)  # what the data cannot distinguish from it, best first
+    p_value: float = 1.0  # family-wise, over all effects and places that were tested
+    gain: Interval = NO_GAIN  # of this cause alone on unseen data: 1 − rms with / rms without, the other causes kept
+    gain_unit: str = "N.m"  # of the rms: "N.m" of the torque; "m" of the tendons' positions
+    confusable_with: tuple[Where, ...] = ()  # what the data cannot distinguish from it
+    intervals: Mapping[str, Interval] = field(default_factory=dict)  # 95 % of what the data determine, by path
+    size: str = ""  # in plain words with physical units
+    places: tuple[CausePlace, ...] = ()  # every place of the cause with its numbers in the extended description
+    evidence: tuple[Evidence, ...] = ()  # pictures of the residual with and without the cause
+    changed: ChangedSize | None = None  # for a change: the size in the reference and now
+    experiment: str = ""  # of an uncertain cause: the recording that would settle it
+    sensors: tuple[Sensor, ...] = ()  # of `calibration`: by how much each sensor is off
 
     def __repr__(self) -> str:
-        place = "".join(
-            f" {kind} {number}" for kind, number in (("joint", self.joint), ("tendon", self.tendon)) if number
-        )
+        place = "".join(f" {kind} {getattr(self, kind)}" for kind in ("joint", "tendon") if getattr(self, kind))
         return f"<Cause {self.effect}{place}: gain {self.gain.value:.3g}; {self.size}>"
 
     @property
@@ -182,9 +114,18 @@ class Cause:
         """Number of the tendon from 1; None everywhere or at several places."""
         return self.where.tendon
 
-    def scaled(self) -> tuple[Term, ...]:
-        """Return the terms of a candidate at its magnitudes."""
-        return tuple(term.times(self.magnitudes.tolist()) for term in self.terms)
+    @property
+    def parameters(self) -> Parameters:
+        """Its numbers in the extended description, of all places: path -> (value, unit)."""
+        return {path: number for place in self.places for path, number in place.parameters.items()}
+
+
+AnyCause = TypeVar("AnyCause", bound=Any)
+
+
+def by_gain(causes: Iterable[AnyCause]) -> list[AnyCause]:
+    """Return causes, or what was judged, the largest gain first."""
+    return sorted(causes, key=lambda cause: -cause.gain.value)
 
 
 def with_error(value: float, error: float) -> Interval:

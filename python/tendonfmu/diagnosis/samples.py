@@ -13,12 +13,11 @@ measured forces less the unexplained torque, which is spread over the tendons as
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tendonfmu.arrays import Array, Data, Flags, Numbers
 from tendonfmu.estimate import CoreRuns, SlowDrift, slowest_drift
@@ -43,15 +42,11 @@ class Series(BlockSeries):
     travel: Numbers  # travel since the joint last reversed, rad [B, n]
 
 
-def _image(data: Mapping[str, Any]) -> Any:
-    """Return the image of a description with a bias that only jumps and without contact detection."""
-    bare = without_learning(data)
-    return native.image_from_json(json.dumps({**bare, "bias": {**bare["bias"], "forget_rate": 0.0}}))
-
-
 def exact_model(data: Mapping[str, Any], recording: FitRecording, *, jumps: bool = True) -> Numbers:
     """Return G of a description from a run of the core, N·m [N, n]; NaN outside of the parts."""
-    image, residual = _image(data), np.full(recording.target.shape, np.nan)
+    bare = without_learning(data)  # with a bias that only jumps, and without contact detection
+    image = native.image_from_json(json.dumps({**bare, "bias": {**bare["bias"], "forget_rate": 0.0}}))
+    residual = np.full(recording.target.shape, np.nan)
     for part in recording.parts:
         arrays = recording.arrays(part)
         outputs = native.Instance(image, kinematics_source=recording.kinematics).run(arrays)
@@ -64,30 +59,27 @@ def exact_model(data: Mapping[str, Any], recording: FitRecording, *, jumps: bool
 # --- the series -------------------------------------------------------------------------------------------------------
 
 
-def make_series(data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, left: Numbers) -> Series:
+def make_series(
+    data: Mapping[str, Any], recordings: Sequence[FitRecording], grid: Grid, left: Numbers, used: Flags
+) -> Series:
     """Average the signals over the blocks of a grid; `left` is what a description leaves of the torque [B, n], N·m."""
-    whole = [recordings[segment.recording] for segment in grid.segments]
-    pieces = list(zip(grid.segments, whole, strict=True))
-    threshold, arms = number_of(data, "velocity_threshold.joint"), moment_arms(data)
-    velocity = grid.means([recording.model.joint_speed for recording in recordings])
+    threshold, segments = number_of(data, "velocity_threshold.joint"), grid.segments
+    angles, speeds = ([getattr(each.model, name) for each in recordings] for name in ("joint_angle", "joint_speed"))
+    velocity = grid.means(speeds)
+    travels = [_travel(angles[one.recording], speeds[one.recording], threshold, one) for one in segments]
     return Series(
         time=grid.means([recording.time for recording in recordings]),
-        recording=np.concatenate([np.full(segment.count, segment.recording) for segment in grid.segments]),
-        segment=np.concatenate([np.full(segment.count, k) for k, segment in enumerate(grid.segments)]),
+        recording=np.concatenate([np.full(segment.count, segment.recording) for segment in segments]),
+        segment=np.concatenate([np.full(segment.count, k) for k, segment in enumerate(segments)]),
         target=left,
-        used=np.concatenate([segment.mean(recording.train[segment.part]) == 1.0 for segment, recording in pieces]),
+        used=used,
         step=grid.step,
-        angle=grid.means([recording.model.joint_angle for recording in recordings]),
+        angle=grid.means(angles),
         velocity=velocity,
-        acceleration=np.concatenate([_slope(velocity[segment.blocks], grid.step) for segment in grid.segments]),
+        acceleration=np.concatenate([_slope(velocity[segment.blocks], grid.step) for segment in segments]),
         force=grid.forces(recordings),
-        tendon_velocity=_tendon_velocity(arms, velocity),
-        travel=np.concatenate(
-            [
-                _travel(recording.model.joint_angle, recording.model.joint_speed, threshold, segment)
-                for segment, recording in pieces
-            ]
-        ),
+        tendon_velocity=_tendon_velocity(moment_arms(data), velocity),
+        travel=np.concatenate(travels),
     )
 
 
@@ -172,7 +164,7 @@ class Samples:
 
     def series(self, data: Data) -> Series:
         """Return the block means of a description's signals and of what it leaves."""
-        return replace(make_series(data, self.recordings, self.grid, self.left(data)), used=self.used)
+        return make_series(data, self.recordings, self.grid, self.left(data), self.used)
 
     def of_recordings(self, data: Data, recordings: Sequence[FitRecording]) -> Samples:
         """Return the samples with the forces of other recordings of the same times; the measured torque stays."""
@@ -236,16 +228,11 @@ def predicted_forces(data: Mapping[str, Any], recordings: Sequence[FitRecording]
         changed = {"tendon_force": predicted}
         if "tendon_position" in groups:
             # a description with a delay pairs the present position with the force `delay` s later
-            change = shifted(recording, (predicted - force) / stiffness, _delay(data))
+            delay = float(sum(row["delay"] for row in extension_rows(data) if row["effect"] == "time_delay"))
+            change = shifted(recording, (predicted - force) / stiffness, delay)
             changed["tendon_position"] = groups["tendon_position"] + change
         moved.append(recording.with_groups(**changed))
     return moved
-
-
-def _delay(data: Mapping[str, Any]) -> float:
-    """Return by how many seconds forces come later than positions, according to the description."""
-    rows = data.get("extensions") or []
-    return float(sum(row["delay"] for row in rows if row["effect"] == "time_delay"))
 
 
 def shifted(recording: FitRecording, values: Numbers, delay: float) -> Numbers:
@@ -306,35 +293,21 @@ def span_of(data: Mapping[str, Any], recordings: Sequence[FitRecording]) -> Span
     arms = moment_arms(data)
     every = max(1, sum(len(recording.time) for recording in recordings) // _LOOKED_AT)
     rows = [np.flatnonzero(recording.train)[::every] for recording in recordings]
-    angle, speed, force, torque = (
-        np.concatenate(signals)
-        for signals in zip(
-            *(_signals(recording, row) for recording, row in zip(recordings, rows, strict=True)), strict=True
-        )
-    )
+
+    def of(signals: Iterable[Numbers]) -> Numbers:
+        return np.concatenate([values[own] for values, own in zip(signals, rows, strict=True)])
+
+    angle, speed = (of(getattr(each.model, name) for each in recordings) for name in ("joint_angle", "joint_speed"))
+    force, ends = of(each.recording.groups["tendon_force"] for each in recordings), [_OUTER, 1 - _OUTER]
     sliding = np.cumsum((speed[:, None, :] * arms)[:, :, ::-1], axis=2)[:, :, ::-1]
     steps = np.concatenate([np.diff(recording.time[part]) for recording in recordings for part in recording.parts])
     return Span(
-        angle=_range(angle),
+        angle=np.quantile(angle, ends, axis=0).T,
         speed=np.quantile(np.abs(speed), _FAST, axis=0),
         tendon_speed=np.quantile(np.abs(sliding), _FAST, axis=0),
-        position=_range(angle @ arms.T),
-        force=_range(force),
-        torque=np.std(torque, axis=0),
-        duration=max(
-            float(recording.time[part][-1] - recording.time[part][0])
-            for recording in recordings
-            for part in recording.parts
-        ),
+        position=np.quantile(angle @ arms.T, ends, axis=0).T,
+        force=np.quantile(force, ends, axis=0).T,
+        torque=np.std(of(recording.target for recording in recordings), axis=0),
+        duration=max(float(one.time[part][-1] - one.time[part][0]) for one in recordings for part in one.parts),
         step=float(np.median(steps)),
     )
-
-
-def _signals(recording: FitRecording, rows: NDArray[np.intp]) -> tuple[Numbers, ...]:
-    model, force = recording.model, recording.recording.groups["tendon_force"]
-    return tuple(values[rows] for values in (model.joint_angle, model.joint_speed, force, recording.target))
-
-
-def _range(values: Numbers) -> Numbers:
-    """Return 1 % and 99 % quantiles [k, 2] of values [N, k]."""
-    return np.asarray(np.quantile(values, [_OUTER, 1 - _OUTER], axis=0).T)

@@ -2,21 +2,32 @@
 
 After each cause, everything is computed anew around the fitted description. The derivatives of a wrong model would
 otherwise ask for small pieces that only correct the linearisation. The search ends when no candidate is material and
-certain.
+certain. The rules by which a round chooses a cause, in their order:
+
+1. What was refused explains something, so no other effect is credited with that; corrections of the torque apart.
+2. The effect that lowers the error most comes first, at the coarsest place that is as good (`Selection.best`).
+3. All corrections of sensors together come before it if they are materially and certainly better (`is_better`).
+4. Effects that columns cannot distinguish from it are fitted, too, and the best fit is taken: columns of a wrong model
+   mislead. A correction of the torque may replace only another one: it resembles most effects (`_to_fit`).
+5. Of fits that are alike, torque that depends on the angles comes first, since friction takes it up.
+6. The effect is fitted at the nearly best places, too, and the best is taken.
+7. A single sensor may be several, if their usual errors explain nearly as much (`beside_calibration`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.base import POSITION, Base, refitted, remembering
-from tendonfmu.diagnosis.candidate_columns import Proposal
+from tendonfmu.diagnosis.candidate_columns import EVERYWHERE, Candidate, Proposal
 from tendonfmu.diagnosis.contact_scan import events_of
-from tendonfmu.diagnosis.effects import BY_NAME, CALIBRATED, CALIBRATION, Place, Term, Where
+from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION, Place, Term, Where
 from tendonfmu.diagnosis.extension_fit import (
     REMEMBERING,
     FittedModel,
@@ -25,11 +36,12 @@ from tendonfmu.diagnosis.extension_fit import (
     memory_of,
     possible,
 )
-from tendonfmu.diagnosis.result import ABSORBED, EVERYWHERE, Cause, CausePlace, Direction, Event, Sensor, with_error
+from tendonfmu.diagnosis.result import ABSORBED, CausePlace, Event, Sensor, with_error
 from tendonfmu.diagnosis.selection import (
     CERTAIN,
     SIGNIFICANCE,
     CauseSearch,
+    Judged,
     Selection,
     is_alike,
     rms_gain,
@@ -54,6 +66,7 @@ LARGEST = 5.0  # times the usual size
 _SHOWN = 3  # sensors named in the size
 # Standard deviations on a bench that was set up with ordinary care; of a moment arm as a share of the described one.
 USUAL = {"force_gain": 0.03, "force_offset": 0.3, "moment_arm": 0.03, "time_delay": 0.002}
+UNITS = {"force_gain": "1", "force_offset": "N", "moment_arm": "m", "time_delay": "s"}
 
 
 @dataclass(frozen=True)
@@ -64,29 +77,40 @@ class _Part:
     usual: float  # size in the unit of the magnitude
     unit: float  # what a magnitude of 1 is, in the unit of the number
 
+    def term(self, magnitude: float) -> Term:
+        """Return a term of that size; a fit leaves it as it is, except for a delay, which is not linear."""
+        mechanism, place, shape = self.proposal.mechanism, self.proposal.place, self.proposal.variant.shape
+        if mechanism.name == "time_delay":
+            return Term(mechanism, place, {"delay": self.unit * magnitude}, (1.0,))
+        return Term(mechanism, place, shape, (magnitude,), fixed=True)
 
-def calibration(view: View, selection: Selection, tried: Collection[str], least_gain: float) -> Cause | None:
+
+def calibration(view: View, selection: Selection, tried: Collection[str], least_gain: float) -> Judged | None:
     """Return all corrections together, if they are material and certain; `tried` are effects that were refused."""
     if CALIBRATION in tried:
         return None
     parts = _parts(view, tried)
     best = _estimated(view, selection, parts)
-    if best is not None and not _late_enough(view, best, parts):
-        parts = [part for part in parts if part.proposal.candidate.name != "time_delay"]
+    late = Where("time_delay")
+    sizes = {} if best is None else dict(zip(parts, best.magnitudes.tolist(), strict=True))
+    if late in sizes and abs(parts[late].unit * sizes[late]) < view.least.least(late):  # the sensors cannot show it
+        del parts[late]
         best = _estimated(view, selection, parts)
     if best is None:
         return None
     gain, error = selection.gain(best)
     if gain < least_gain or gain <= CERTAIN * error:
         return None
-    p_value = min(1.0, len(STRENGTHS) * step_p_value(selection.base, best.unseen))
-    terms = tuple(_term(part, value) for part, value in zip(parts, best.magnitudes.tolist(), strict=True))
     return replace(
-        best, gain=with_error(gain, error), p_value=p_value, terms=terms, sensors=_sensors(view, best, parts)
+        best,
+        gain=with_error(gain, error),
+        p_value=min(1.0, len(STRENGTHS) * step_p_value(selection.base, best.unseen)),
+        terms=tuple(part.term(value) for part, value in zip(parts.values(), best.magnitudes.tolist(), strict=True)),
+        sensors=_sensors(moment_arms(view.data), best, parts),
     )
 
 
-def is_better(together: Cause, single: Cause | None, least_gain: float) -> bool:
+def is_better(together: Judged, single: Judged | None, least_gain: float) -> bool:
     """Return whether all corrections together are materially and certainly better than the best single effect."""
     if single is None:
         return True
@@ -94,12 +118,20 @@ def is_better(together: Cause, single: Cause | None, least_gain: float) -> bool:
     return gain >= least_gain and gain > CERTAIN * error
 
 
-def _parts(view: View, tried: Collection[str]) -> list[_Part]:
+def beside_calibration(trial: Trial, together: Judged | None) -> Trial:
+    """Say of a single sensor that is off that it may be several, if their usual errors explain nearly as much."""
+    cause = trial.cause
+    if together is None or cause.effect not in CALIBRATED or together.gain.value < NEARLY * cause.gain.value:
+        return trial
+    return replace(trial, cause=replace(cause, alike=(*cause.alike, together)))
+
+
+def _parts(view: View, tried: Collection[str]) -> dict[Where, _Part]:
     """Return the corrections that the description lacks and that refitting leaves visible."""
     arms, count = moment_arms(view.data), view.columns.values.shape[2]
     parts: dict[Where, _Part] = {}
     for proposal in view.columns.proposals:
-        name, place = proposal.candidate.name, proposal.place
+        name, place = proposal.mechanism.name, proposal.place
         if name not in CALIBRATED or name in tried:
             continue
         usual, unit = USUAL[name], 1.0
@@ -112,80 +144,53 @@ def _parts(view: View, tried: Collection[str]) -> list[_Part]:
         mix[proposal.columns] = 1.0
         if usual > 0.0 and unit > 0.0 and view.grams.surviving(mix) >= ABSORBED:
             parts.setdefault(Where(name, *place), _Part(proposal, usual, unit))
-    return list(parts.values())
+    return parts
 
 
-def _estimated(view: View, selection: Selection, parts: Sequence[_Part]) -> Cause | None:
+def _estimated(view: View, selection: Selection, parts: dict[Where, _Part]) -> Judged | None:
     """Return the corrections with the strength of the prior knowledge that leaves least on unseen stretches."""
     if not parts:
         return None
-    usual = np.array([part.usual for part in parts])
+    usual = np.array([part.usual for part in parts.values()])
     mix = np.zeros((view.columns.values.shape[2], len(parts)))
-    mix[[part.proposal.columns.start for part in parts], np.arange(len(parts))] = 1.0
-    row = BY_NAME[CALIBRATION]
-    direction = Direction(mix, -LARGEST * usual, LARGEST * usual, EVERYWHERE, usual)
-    cause = Cause(Where(CALIBRATION), row.title, row.explanation, direction=direction)
-    fits = [selection.regularised(cause, view.grams.ridge(usual, strength)) for strength in STRENGTHS]
+    mix[[part.proposal.columns.start for part in parts.values()], np.arange(len(parts))] = 1.0
+    together = Candidate(Where(CALIBRATION), (), mix, -LARGEST * usual, LARGEST * usual, EVERYWHERE, usual)
+    fits = [selection.regularised(together, view.grams.ridge(usual, strength)) for strength in STRENGTHS]
     plausible = [fit for fit in fits if np.mean((fit.magnitudes / usual) ** 2) <= PLAUSIBLE**2]
     return min(plausible, key=lambda fit: float(fit.unseen.sum()), default=None)
 
 
-def _late_enough(view: View, cause: Cause, parts: Sequence[_Part]) -> bool:
-    """Return whether the sensors can show the delay."""
-    return all(
-        abs(part.unit * magnitude) >= view.least.least(Where("time_delay"))
-        for part, magnitude in zip(parts, cause.magnitudes.tolist(), strict=True)
-        if part.proposal.candidate.name == "time_delay"
-    )
-
-
-def _term(part: _Part, magnitude: float) -> Term:
-    """Return a term of that size; a fit leaves it as it is, except for a delay, which is not linear."""
-    proposal = part.proposal
-    if proposal.candidate.name == "time_delay":
-        return Term(proposal.candidate, proposal.place, {"delay": part.unit * magnitude}, (1.0,))
-    return Term(proposal.candidate, proposal.place, proposal.variant.shape, (magnitude,), fixed=True)
-
-
-# --- by how much each is off ------------------------------------------------------------------------------------------
-
-
-def _sensors(view: View, cause: Cause, parts: Sequence[_Part]) -> tuple[Sensor, ...]:
+def _sensors(arms: Numbers, cause: Judged, parts: dict[Where, _Part]) -> tuple[Sensor, ...]:
     """Return each correction, and gain and arm of a tendon together where only these can be determined."""
-    arms = moment_arms(view.data)
-    index = {(part.proposal.candidate.name, part.proposal.place): k for k, part in enumerate(parts)}
     rows: list[tuple[Where, str, Numbers]] = []
-    for (name, place), k in index.items():
-        unit = {"force_gain": "1", "force_offset": "N", "moment_arm": "m", "time_delay": "s"}[name]
-        alone = np.zeros(len(parts))
-        alone[k] = parts[k].unit
-        rows.append((Where(name, *place), unit, alone))
-        gain = index.get(("force_gain", Place(tendon=place.tendon)))
-        if name == "moment_arm" and gain is not None and place.joint is not None and place.tendon is not None:
-            both = alone / float(arms[place.tendon - 1, place.joint - 1])
-            both[gain] = 1.0
-            rows.append((Where(CALIBRATION, *place), "1", both))
+    ways = dict(zip(parts, np.eye(len(parts)), strict=True))
+    for where, part in parts.items():
+        rows.append((where, UNITS[where.effect], alone := part.unit * ways[where]))
+        gain = Where("force_gain", None, where.tendon)
+        if where.effect == "moment_arm" and gain in ways and where.joint is not None and where.tendon is not None:
+            both = alone / float(arms[where.tendon - 1, where.joint - 1]) + ways[gain]
+            rows.append((Where(CALIBRATION, *where.place), "1", both))
     return tuple(
         Sensor(where, with_error(float(mix @ cause.magnitudes), float(np.sqrt(mix @ cause.covariance @ mix))), unit)
         for where, unit, mix in rows
     )
 
 
-def calibrated(cause: Cause) -> Cause:
-    """Return a calibration of the fitted model: its sensors, one place for all numbers there, and its size."""
-    known, intervals = {sensor.where: sensor for sensor in cause.sensors}, dict(cause.intervals)
-    merged: dict[tuple[int | None, int | None], dict[str, tuple[float, str]]] = {}
-    for term, place in zip(cause.terms, cause.places, strict=True):
-        merged.setdefault((place.joint, place.tendon), {}).update(place.parameters)
+def calibrated(cause: Judged, places: Sequence[CausePlace], intervals: Mapping[str, Interval]) -> dict[str, Any]:
+    """Return what is known of a calibration: its sensors, one place for all numbers there, intervals, and its size."""
+    known, known_intervals = {sensor.where: sensor for sensor in cause.sensors}, dict(intervals)
+    merged: dict[Place, dict[str, tuple[float, str]]] = {}
+    for term, place in zip(cause.terms, places, strict=True):
+        merged.setdefault(term.place, {}).update(place.parameters)
         ((value, unit),) = place.parameters.values()
-        where = term.where
-        before = known.get(where, Sensor(where, Interval(value), unit)).correction
+        before = known.get(term.where, Sensor(term.where, Interval(value), unit)).correction
         moved = value - before.value  # a delay was fitted again
-        known[where] = Sensor(where, Interval(value, before.low + moved, before.high + moved), unit)
-        intervals |= dict.fromkeys(place.parameters, known[where].correction)
+        now = Interval(value, before.low + moved, before.high + moved)
+        known[term.where] = Sensor(term.where, now, unit)
+        known_intervals |= dict.fromkeys(place.parameters, now)
     sensors = tuple(known.values())
-    places = tuple(CausePlace(*place, numbers) for place, numbers in merged.items())
-    return replace(cause, sensors=sensors, places=places, intervals=intervals, size=_size(sensors))
+    merged_places = tuple(CausePlace(*place, numbers) for place, numbers in merged.items())
+    return {"sensors": sensors, "places": merged_places, "intervals": known_intervals, "size": _size(sensors)}
 
 
 def _size(sensors: Sequence[Sensor]) -> str:
@@ -214,7 +219,7 @@ NEARLY = 0.8  # of the gain of a single sensor: prior knowledge always takes a p
 class Trial:
     """A cause and the model fitted with it; the model is None if there is none."""
 
-    cause: Cause
+    cause: Judged
     model: FittedModel | None
     error: Numbers  # Σ e² on unseen stretches, (N·m)² [K]
 
@@ -222,19 +227,19 @@ class Trial:
 class ExtensionSearch(CauseSearch):
     """Adds cause after cause to a base, and keeps the model with all of them."""
 
+    events: tuple[Event, ...] = ()  # contact and stalls, which the samples of the base lack
+
     def __init__(self, base: Base, least_gain: float) -> None:
         super().__init__(MOST_CAUSES + len(base.start))
         self.base, self.model, self._least_gain = base, base.model, least_gain
-        self.first = base.look(base.nominal, ())
+        self.first = base.look(base.nominal, ())  # what the nominal description lacks and leaves
         self.causes = [_of_start(terms) for terms in base.start]
 
     def run(self, step: Step) -> None:
         self.view = self.base.look(self.model)
         super().run(step)
 
-    def _try_next(self, tried: set[str]) -> tuple[Cause, bool] | None:
-        # Refused effects explain something, so no other effect is credited with that. A correction of the torque
-        # itself is excluded: it resembles whatever else is missing.
+    def _try_next(self, tried: set[str]) -> tuple[Judged, bool] | None:
         selection = self.view.beside({refused.where for refused in self.refused if refused.effect not in SCALING})
         best = selection.best(self._least_gain, tried)
         together = calibration(self.view, selection, tried, self._least_gain)
@@ -246,36 +251,31 @@ class ExtensionSearch(CauseSearch):
             return None
         return trial.cause, trial.cause.p_value < SIGNIFICANCE and self._take(trial)
 
-    def _best_fitted(self, selection: Selection, best: Cause) -> Trial:
-        """Fit the effects that the columns cannot distinguish and take the best: columns of a wrong model mislead."""
+    def _best_fitted(self, selection: Selection, best: Judged) -> Trial:
+        """Fit the effect, its rivals and its places, and return the best trial."""
         rivals = [self._named(selection.refined(rival.effect), selection) for rival in _to_fit(best)]
-        named = [self._named(best, selection), *(rival for rival in rivals if rival.p_value < SIGNIFICANCE)]
-        trials = [self._tried(cause) for cause in named]
-        chosen = min(trials, key=lambda trial: float(trial.error.sum()))
+        trials = self._certain_trials([self._named(best, selection)], rivals)
+        chosen = _best_of(trials)
         same = [trial for trial in trials if trial.model is not None and is_alike(trial.error, chosen.error)]
-        # friction takes up torque of position, so of what cannot be distinguished that torque comes first
         chosen = next((trial for trial in same if trial.cause.effect in POSITION), chosen)
         fitted = {trial.cause.effect for trial in trials}
         alike = [trial.cause for trial in same if trial is not chosen]
         alike += [rival for rival in best.alike if rival.effect not in fitted]
-        chosen = self._at_best_place(chosen, selection)
+        if chosen.cause.mix is (there := selection.refined(chosen.cause.effect)).mix:
+            near = [self._named(near, selection) for near in selection.near(there)[: MOST_FITTED - 1]]
+            chosen = _best_of([chosen, *self._certain_trials([], near)])
         return replace(chosen, cause=replace(chosen.cause, alike=tuple(alike)))
 
-    def _at_best_place(self, trial: Trial, selection: Selection) -> Trial:
-        """Fit the effect at the nearly best places, too, and take the best."""
-        best = selection.refined(trial.cause.effect)
-        if trial.cause.direction is not best.direction:
-            return trial
-        others = [self._named(near, selection) for near in selection.near(best)[: MOST_FITTED - 1]]
-        trials = [trial, *(self._tried(other) for other in others if other.p_value < SIGNIFICANCE)]
-        return min(trials, key=lambda trial: float(trial.error.sum()))
+    def _certain_trials(self, first: Sequence[Judged], others: Sequence[Judged]) -> list[Trial]:
+        """Fit the first causes, and the others that are no chance."""
+        return [self._tried(cause) for cause in (*first, *(one for one in others if one.p_value < SIGNIFICANCE))]
 
-    def _named(self, cause: Cause, selection: Selection) -> Cause:
+    def _named(self, cause: Judged, selection: Selection) -> Judged:
         """Return a judged candidate with its terms at its magnitudes, gain and p-value."""
-        gain = with_error(*selection.gain(cause))
-        return replace(cause, terms=cause.scaled(), gain=gain, p_value=self.view.p_value(cause))
+        gain, p_value = with_error(*selection.gain(cause)), self.view.p_value(cause.mix)
+        return replace(cause, terms=cause.scaled(), gain=gain, p_value=p_value)
 
-    def _tried(self, cause: Cause) -> Trial:
+    def _tried(self, cause: Judged) -> Trial:
         """Fit the description with a further cause."""
         base = self.base
         everything = terms_of([*self.causes, cause])
@@ -317,61 +317,40 @@ class ExtensionSearch(CauseSearch):
         self.causes += [_of_start(terms) for terms in memory]
         return other
 
-    def small(self) -> list[Cause]:
-        """Return the best place of every effect that is certain but not material."""
-        small, selection = [], self.view.selection
-        known = {refused.effect for refused in self.refused}
-        for cause in selection.ranked():
-            gain, error = selection.gain(cause)
-            if cause.effect not in known and gain > CERTAIN * error:
-                named = self._named(cause, selection)
-                small += [named] if named.p_value < SIGNIFICANCE else []
-        return small
+    @cached_property
+    def small(self) -> list[Judged]:
+        """What was refused, and the best place of every other effect that is certain but not material."""
+        selection, known = self.view.selection, {refused.effect for refused in self.refused}
+        gains = [(cause, *selection.gain(cause)) for cause in selection.ranked(known)]
+        named = [self._named(cause, selection) for cause, gain, error in gains if gain > CERTAIN * error]
+        return [*self.refused, *(cause for cause in named if cause.p_value < SIGNIFICANCE)]
 
 
-def beside_calibration(trial: Trial, together: Cause | None) -> Trial:
-    """Say of a single sensor that is off that it may be several, if their usual errors explain nearly as much."""
-    cause = trial.cause
-    if together is None or cause.effect not in CALIBRATED or together.gain.value < NEARLY * cause.gain.value:
-        return trial
-    return replace(trial, cause=replace(cause, alike=(*cause.alike, together)))
+def _best_of(trials: Sequence[Trial]) -> Trial:
+    return min(trials, key=lambda trial: float(trial.error.sum()))
 
 
-def _to_fit(best: Cause) -> list[Cause]:
+def _to_fit(best: Judged) -> list[Judged]:
     """Return the effects that cannot be distinguished from the best one and may replace it."""
-    # A correction of the torque itself may replace only another such correction: it resembles most effects.
     scaling = best.effect in SCALING
     return [rival for rival in best.alike if scaling or rival.effect not in SCALING][: MOST_FITTED - 1]
 
 
-def terms_of(causes: Sequence[Cause]) -> list[Term]:
+def terms_of(causes: Sequence[Judged]) -> list[Term]:
     """Return the terms of all causes."""
     return [term for cause in causes for term in cause.terms]
 
 
-def _of_start(terms: tuple[Term, ...]) -> Cause:
+def _of_start(terms: tuple[Term, ...]) -> Judged:
     """Return a cause of the base, at one place or several."""
-    candidate, place = terms[0].candidate, terms[0].place if len(terms) == 1 else Place()
-    return Cause(Where(candidate.name, *place), candidate.title, candidate.explanation, terms=terms)
+    place = terms[0].place if len(terms) == 1 else Place()
+    return Judged(Where(terms[0].mechanism.name, *place), terms)
 
 
 # --- from recordings to causes ---------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Search:
-    """The result of a search."""
-
-    base: Base  # its samples, without events
-    extended: FittedModel
-    first: View  # what the nominal and the extended description lack and leave
-    last: View
-    causes: tuple[Cause, ...]  # in the order in which they were found
-    small: tuple[Cause, ...]  # effects that are certain but not material
-    events: tuple[Event, ...]  # contact and stalls
-
-
-def search(base: Base, *, least_gain: float, seed: int, phases: Phases) -> Search:
+def search(base: Base, *, least_gain: float, seed: int, phases: Phases) -> ExtensionSearch:
     """Search for the causes that a description lacks."""
     with phases.start("contact"):
         whole = base.samples
@@ -380,20 +359,11 @@ def search(base: Base, *, least_gain: float, seed: int, phases: Phases) -> Searc
     with phases.start("causes", MOST_CAUSES) as step:
         searched = ExtensionSearch(base, least_gain)
         searched.run(step)
-    if events:
-        # drop events that the causes explain
-        left, _ = events_of(searched.model.data, whole, seed)
-        events = tuple(event for event in events if any(_overlap(event, other) for other in left))
-    return Search(
-        base=base,
-        extended=searched.model,
-        first=searched.first,
-        last=searched.view,
-        causes=tuple(searched.causes),
-        small=(*searched.refused, *searched.small()),
-        events=events,
+    # drop events that the causes explain
+    left = events_of(searched.model.data, whole, seed)[0] if events else ()
+    searched.events = tuple(
+        event
+        for event in events
+        if any(one.recording == event.recording and one.start < event.end and event.start < one.end for one in left)
     )
-
-
-def _overlap(one: Event, other: Event) -> bool:
-    return one.recording == other.recording and one.start < other.end and other.start < one.end
+    return searched

@@ -10,19 +10,19 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from scipy.stats import ttest_1samp
 
 from tendonfmu.arrays import Data, Numbers
-from tendonfmu.diagnosis.candidate_columns import LARGEST_SECANT
-from tendonfmu.diagnosis.effects import COMMON, Candidate, Place, Term, Where
-from tendonfmu.diagnosis.result import ABSORBED, HERE, Cause, Direction, Invisible, with_error
+from tendonfmu.diagnosis.candidate_columns import HERE, LARGEST_SECANT, Candidate
+from tendonfmu.diagnosis.effects import COMMON, Mechanism, Place, Term, Where, title_of
+from tendonfmu.diagnosis.result import ABSORBED, NO_GAIN, Invisible, Sensor, with_error
 from tendonfmu.model import extended_row, moment_arms
 from tendonfmu.recordings import FitRecording, zero_phase
-from tendonfmu.statistics import Grams, standard_error
+from tendonfmu.statistics import Grams, Interval, standard_error
 from tendonfmu.tasks import Step
 
 # --- what sensors can show --------------------------------------------------------------------------------------------
@@ -55,9 +55,9 @@ class LeastSizes:
                 return OF_NOISE * float(self.tendon_noise[where.tendon - 1])
         return 0.0
 
-    def worth(self, candidate: Candidate, place: Place, shape: Mapping[str, float]) -> bool:
+    def worth(self, mechanism: Mechanism, place: Place, shape: Mapping[str, float]) -> bool:
         """Return whether a step of this size can lead to a size that the sensors resolve."""
-        least = self.least(Where(candidate.name, *place))
+        least = self.least(Where(mechanism.name, *place))
         return least == 0.0 or LARGEST_SECANT * abs(float(next(iter(shape.values())))) >= least
 
     def shows(self, effect: str, place: Place, row: Mapping[str, Any] | None) -> bool:
@@ -67,10 +67,10 @@ class LeastSizes:
             return True
         return bool(abs(row[number]) >= self.least(Where(effect, *place)))
 
-    def resolved(self, cause: Cause, magnitudes: Sequence[float] | Numbers) -> bool:
+    def resolved(self, candidate: Candidate, magnitudes: Sequence[float] | Numbers) -> bool:
         """Return whether a candidate with these magnitudes [d] is large enough."""
-        least = self.least(cause.where)
-        return least == 0.0 or abs(float(magnitudes[0])) * cause.direction.step >= BEFORE_FIT * least
+        least = self.least(candidate.where)
+        return least == 0.0 or abs(float(magnitudes[0])) * candidate.step >= BEFORE_FIT * least
 
     def shows_all(self, effect: str, terms: Sequence[Term], data: Data) -> bool:
         """Return whether the sensors can show the sizes of a fitted effect; no friction is negative."""
@@ -116,8 +116,27 @@ ALIKE = 1.64  # standard errors of the paired difference, within which two cause
 SAME = 0.015  # of the error, about a quarter of what is material: a smaller difference does not count, however certain
 FINER = 0.5  # standard errors by which a finer place must be better: both have as many numbers
 NEAR = 0.1  # of what an effect removes: its derivatives do not distinguish places that are this close
-Judge = Callable[[list[Cause]], tuple[list[Cause], list[int]]]  # causes -> with gains on unseen data, the weak ones
 SMALLEST_GAIN = 1e-6  # where every gain counts as material
+
+
+@dataclass(frozen=True, eq=False)
+class Judged(Candidate):
+    """A candidate with its magnitudes, its error, and how certain it is."""
+
+    magnitudes: Numbers = field(default_factory=lambda: np.zeros(0))  # [d]
+    covariance: Numbers = field(default_factory=lambda: np.zeros((0, 0)))  # [d, d]
+    unseen: Numbers = field(default_factory=lambda: np.zeros(0))  # Σ e² by stretch, (N·m)²
+    gain: Interval = NO_GAIN  # 1 − rms with / rms without
+    p_value: float = 1.0  # family-wise
+    alike: tuple[Judged, ...] = ()  # what the data cannot distinguish from it, best first
+    sensors: tuple[Sensor, ...] = ()  # of `calibration`
+
+    def scaled(self) -> tuple[Term, ...]:
+        """Return its terms at its magnitudes."""
+        return tuple(term.times(self.magnitudes.tolist()) for term in self.terms)
+
+
+Judge = Callable[[list[Judged]], tuple[list[Judged], list[int]]]  # causes -> with gains on unseen data, the weak ones
 
 
 class CauseSearch(ABC):
@@ -125,8 +144,8 @@ class CauseSearch(ABC):
 
     def __init__(self, most: int) -> None:
         """Begin without a cause; stop after `most` of them."""
-        self.causes: list[Cause] = []
-        self.refused: list[Cause] = []  # causes that were selected but not confirmed
+        self.causes: list[Judged] = []
+        self.refused: list[Judged] = []  # causes that were selected but not confirmed
         self._most = most
 
     def run(self, step: Step) -> None:
@@ -141,23 +160,18 @@ class CauseSearch(ABC):
                 self.refused.append(cause)
 
     @abstractmethod
-    def _try_next(self, tried: set[str]) -> tuple[Cause, bool] | None:
+    def _try_next(self, tried: set[str]) -> tuple[Judged, bool] | None:
         """Try the best effect that is not in `tried`; return it and whether it was taken, None if none is material."""
 
 
-def confirmed(causes: Sequence[Cause], judge: Judge) -> tuple[list[Cause], list[Cause]]:
+def confirmed(causes: Sequence[Judged], judge: Judge) -> tuple[list[Judged], list[Judged]]:
     """Drop the weakest cause until none is weak; return the others and the dropped ones, with their gains."""
-    kept, dropped = list(causes), list[Cause]()
+    kept, dropped = list(causes), list[Judged]()
     while True:
         kept, weak = judge(kept)
         if not weak:
             return kept, dropped
         dropped.append(kept.pop(min(weak, key=lambda k: kept[k].gain.value)))
-
-
-def by_gain(causes: Sequence[Cause]) -> list[Cause]:
-    """Return the causes, the largest gain first."""
-    return sorted(causes, key=lambda cause: -cause.gain.value)
 
 
 class Selection:
@@ -166,74 +180,71 @@ class Selection:
     def __init__(
         self,
         grams: Grams,
-        causes: Sequence[Cause],
+        candidates: Sequence[Candidate],
         least: LeastSizes,
-        beside: Sequence[Cause] = (),
+        beside: Sequence[Candidate] = (),
         shares: Sequence[float] | None = None,
     ) -> None:
         """Judge all candidates; `shares` are those that survive refitting, if they are known."""
         # `beside` holds causes that are taken as present, so that no other effect is credited with what they explain.
-        self.grams, self.causes = grams, list(causes)
-        self.shares = [grams.surviving(cause.direction.mix) for cause in causes] if shares is None else list(shares)
-        self._beside = [cause.direction for cause in beside]
+        self.grams, self.candidates, self._beside = grams, list(candidates), beside
+        self.shares = [grams.surviving(candidate.mix) for candidate in candidates] if shares is None else list(shares)
         self.base = grams.by_stretch(None, None)
         if beside:
-            known = _joined(*self._beside)
-            self.base = grams.by_stretch(known.mix, grams.error(known.mix, known.low, known.high)[1])
+            known = _joined(*beside)
+            self.base = grams.by_stretch(known[0], grams.error(*known)[1])
         effects = {cause.effect for cause in beside}
         judged = []
-        for cause, share in zip(causes, self.shares, strict=True):
-            if share < ABSORBED or cause.effect in effects:
+        for candidate, share in zip(candidates, self.shares, strict=True):
+            if share < ABSORBED or candidate.effect in effects:
                 continue
-            both = _joined(*self._beside, cause.direction)
-            columns = both.mix, both.low, both.high
-            magnitudes = grams.magnitudes(*columns)[-len(cause.direction.low) :]
-            if least.resolved(cause, magnitudes):
+            columns = _joined(*beside, candidate)
+            magnitudes = grams.magnitudes(*columns)[-len(candidate.low) :]
+            if least.resolved(candidate, magnitudes):
                 error, by_fold = grams.error(*columns)
-                if error <= (1.0 - cause.direction.least_gain) ** 2 * self.base.sum():
-                    judged.append((error, cause, magnitudes, by_fold))
+                if error <= (1.0 - candidate.least_gain) ** 2 * self.base.sum():
+                    judged.append((error, candidate, magnitudes, by_fold))
         self._results = sorted(judged, key=lambda result: result[0])
-        self._known: dict[int, Cause] = {}
+        self._known: dict[int, Judged] = {}
 
-    def regularised(self, cause: Cause, ridge: Numbers) -> Cause:
+    def regularised(self, candidate: Candidate, ridge: Numbers) -> Judged:
         """Return a candidate with magnitudes that are expected to be small, their covariance, and its error."""
         # ridge: [d], weights of the squared magnitudes; their usual sizes are in `ordinary`
-        own, known = cause.direction, sum(len(beside.low) for beside in self._beside)
-        both = _joined(*self._beside, own)
-        arguments = both.mix, both.low, both.high, np.concatenate([np.zeros(known), ridge])
-        magnitudes = self.grams.magnitudes(*arguments)[known:]
+        known = sum(len(cause.low) for cause in self._beside)
+        columns = _joined(*self._beside, candidate)
+        arguments = *columns, np.concatenate([np.zeros(known), ridge])
         _, by_fold = self.grams.error(*arguments)
-        energy, scores = self.grams.scores(own.mix, by_fold[:, known:])
+        energy, scores = self.grams.scores(candidate.mix, by_fold[:, known:])
         inverse = np.linalg.inv(energy + np.diag(ridge))
         # scatter of the estimate, and by how much the prior knowledge pulls it away from a usual size
-        covariance = inverse @ (scores.T @ scores + np.diag((ridge * own.ordinary) ** 2)) @ inverse
-        unseen = self.grams.by_stretch(both.mix, by_fold)
-        return replace(cause, magnitudes=magnitudes, covariance=covariance, unseen=unseen)
+        covariance = inverse @ (scores.T @ scores + np.diag((ridge * candidate.ordinary) ** 2)) @ inverse
+        magnitudes, unseen = self.grams.magnitudes(*arguments)[known:], self.grams.by_stretch(columns[0], by_fold)
+        return Judged(**vars(candidate), magnitudes=magnitudes, covariance=covariance, unseen=unseen)
 
-    def ranked(self) -> list[Cause]:
+    def ranked(self, tried: Collection[str] = ()) -> list[Judged]:
         """Return the best place and shape of each effect that lowers the error, the best first."""
         best: dict[str, int] = {}
-        for k, (error, cause, _, _) in enumerate(self._results):
-            if error < self.base.sum():
-                best.setdefault(cause.effect, k)
+        for k, (error, candidate, _, _) in enumerate(self._results):
+            if error < self.base.sum() and candidate.effect not in tried:
+                best.setdefault(candidate.effect, k)
         return [self._judged(k) for k in best.values()]
 
-    def _judged(self, number: int) -> Cause:
+    def _judged(self, number: int) -> Judged:
         if number not in self._known:
-            _, cause, magnitudes, by_fold = self._results[number]
-            unseen = self.grams.by_stretch(_joined(*self._beside, cause.direction).mix, by_fold)
-            self._known[number] = replace(cause, magnitudes=magnitudes, unseen=unseen)
+            _, candidate, magnitudes, by_fold = self._results[number]
+            unseen = self.grams.by_stretch(_joined(*self._beside, candidate)[0], by_fold)
+            self._known[number] = Judged(**vars(candidate), magnitudes=magnitudes, unseen=unseen)
         return self._known[number]
 
-    def gain(self, cause: Cause, before: Numbers | None = None) -> tuple[float, float]:
+    def gain(self, cause: Judged, before: Numbers | None = None) -> tuple[float, float]:
         """Return 1 − rms with / rms without, and its standard error."""
         # `before` is Σ e² without the cause by stretch [stretches]; None for that of the model.
         return rms_gain(self.base if before is None else before, cause.unseen)
 
-    def best(self, least_gain: float, tried: Collection[str] = ()) -> Cause | None:
+    def best(self, least_gain: float, tried: Collection[str] = ()) -> Judged | None:
         """Return the effect that lowers the error most, at the coarsest place that is as good."""
         # None if no effect is material and certain.
-        ranked = [cause for cause in self.ranked() if cause.effect not in tried]
+        ranked = self.ranked(tried)
         if not ranked:
             return None
         best = self.refined(ranked[0].effect)
@@ -242,34 +253,33 @@ class Selection:
             return None
         return replace(best, gain=with_error(gain, error), alike=self.alike(best, ranked))
 
-    def alike(self, best: Cause, ranked: Sequence[Cause]) -> tuple[Cause, ...]:
+    def alike(self, best: Judged, ranked: Sequence[Judged]) -> tuple[Judged, ...]:
         """Return the other effects that the data cannot distinguish from the best."""
         others = (cause for cause in ranked if cause.effect != best.effect)
         return tuple(cause for cause in others if is_alike(cause.unseen, best.unseen))
 
-    def refined(self, effect: str) -> Cause:
+    def refined(self, effect: str) -> Judged:
         """Return the best place at the coarsest level, or a finer one if it is certainly better."""
         levels: dict[int, int] = {}
-        for k, (_, cause, _, _) in enumerate(self._results):
-            if cause.effect == effect:
-                levels.setdefault(cause.direction.level, k)
-        places = [self._judged(levels[level]) for level in sorted(levels)]
-        chosen = places[0]
-        for finer in places[1:]:
+        for k, (_, candidate, _, _) in enumerate(self._results):
+            if candidate.effect == effect:
+                levels.setdefault(candidate.level, k)
+        chosen, *others = [self._judged(levels[level]) for level in sorted(levels)]
+        for finer in others:
             gain, error = self.gain(finer, chosen.unseen)
             if gain > FINER * error:
                 chosen = finer
         return chosen
 
-    def near(self, best: Cause) -> list[Cause]:
+    def near(self, best: Judged) -> list[Judged]:
         """Return the same effect at other places of the same level that are nearly as good, the best first."""
         least = float(best.unseen.sum())
         most = least + NEAR * (float(self.base.sum()) - least)
         near: dict[Where, int] = {}
-        for k, (error, cause, _, _) in enumerate(self._results):
-            same = (cause.effect, cause.direction.level) == (best.effect, best.direction.level)
-            if same and cause.where != best.where and error <= most:
-                near.setdefault(cause.where, k)
+        for k, (error, candidate, _, _) in enumerate(self._results):
+            same = (candidate.effect, candidate.level) == (best.effect, best.level)
+            if same and candidate.where != best.where and error <= most:
+                near.setdefault(candidate.where, k)
         return [self._judged(k) for k in near.values()]
 
 
@@ -279,19 +289,24 @@ def names_with(effect: str, named: Collection[str]) -> int:
     return 1 if effect in COMMON or effect in others else 1 + len(others)
 
 
+def names_needed(causes: Sequence[Judged]) -> list[int]:
+    """Return how many names count up to each cause, the largest gain first: it needs so many times the least gain."""
+    order = sorted(range(len(causes)), key=lambda k: -causes[k].gain.value)
+    named = [causes[k].effect for k in order]
+    needed = {k: names_with(causes[k].effect, named[:place]) for place, k in enumerate(order)}
+    return [needed[k] for k in range(len(causes))]
+
+
 def is_alike(other: Numbers, best: Numbers) -> bool:
     """Return whether errors by stretch [K] cannot be distinguished from those of the best."""
     behind = other - best
     return bool(behind.sum() <= max(ALIKE * standard_error(behind), SAME * best.sum()))
 
 
-def _joined(*directions: Direction) -> Direction:
-    """Return the direction of several causes together."""
-    return Direction(
-        np.concatenate([direction.mix for direction in directions], axis=1),
-        np.concatenate([direction.low for direction in directions]),
-        np.concatenate([direction.high for direction in directions]),
-    )
+def _joined(*candidates: Candidate) -> tuple[Numbers, Numbers, Numbers]:
+    """Return the columns of several candidates together [c, d], and the bounds of all magnitudes [d]."""
+    mix, low, high = (np.concatenate([getattr(one, name) for one in candidates], -1) for name in ("mix", "low", "high"))
+    return mix, low, high
 
 
 def step_p_value(before: Numbers, after: Numbers) -> float:
@@ -315,30 +330,22 @@ def rms_gain(before: Numbers, after: Numbers) -> tuple[float, float]:
 
 
 def invisible_effects(
-    selection: Selection, causes: Sequence[Cause], known: Sequence[Cause], least_gain: float
-) -> list[tuple[Cause, Invisible]]:
-    """Return, for each place at which an effect of ordinary size would not become a cause, its best shape."""
-    places = {term.where for cause in known for term in cause.terms}
+    selection: Selection, causes: Sequence[Judged] = (), known: Collection[Where] = (), least_gain: float | None = None
+) -> list[tuple[Candidate, Invisible]]:
+    """Return, for each place at which an effect is not visible, the shape that comes nearest."""
+    # It is not visible if refitting absorbs it or, with a least gain, if one of ordinary size would not be a cause.
     names = [cause.effect for cause in causes]
-    best: dict[Where, tuple[float, Cause, Invisible]] = {}
-    for cause, share in zip(selection.causes, selection.shares, strict=True):
-        if cause.direction.level != HERE or cause.where in places:
+    best: dict[Where, tuple[float, Candidate, Invisible]] = {}
+    for candidate, share in zip(selection.candidates, selection.shares, strict=True):
+        if candidate.level != HERE or candidate.where in known:
             continue
-        gain = selection.grams.ordinary_gain(cause.direction.mix, cause.direction.ordinary)
-        needed = least_gain * names_with(cause.effect, names)
-        nearness = min(share / ABSORBED, gain / max(needed, SMALLEST_GAIN))  # from 1 on it is visible
-        if cause.where not in best or nearness > best[cause.where][0]:
-            hidden = Invisible(cause.where, cause.title, share, "", ordinary_gain=gain, needed_gain=needed)
-            best[cause.where] = (nearness, cause, hidden)
+        nearness, gain, needed = share / ABSORBED, None, None  # from 1 on it is visible
+        if least_gain is not None:
+            gain = selection.grams.ordinary_gain(candidate.mix, candidate.ordinary)
+            needed = least_gain * names_with(candidate.effect, names)
+            nearness = min(nearness, gain / max(needed, SMALLEST_GAIN))
+        if candidate.where not in best or nearness > best[candidate.where][0]:
+            hidden = Invisible(candidate.where, title_of(candidate.effect), share, "", {}, gain, needed)
+            best[candidate.where] = (nearness, candidate, hidden)
     ranked = sorted(best.values(), key=lambda entry: -entry[0])
-    return [(cause, hidden) for nearness, cause, hidden in ranked if nearness < 1.0]
-
-
-def absorbed_effects(selection: Selection, experiment: str) -> list[Invisible]:
-    """Return, for each effect and place that refitting and background absorb, the shape that comes nearest."""
-    best: dict[Where, Invisible] = {}
-    for cause, share in zip(selection.causes, selection.shares, strict=True):
-        if cause.direction.level == HERE and (cause.where not in best or share > best[cause.where].surviving_share):
-            best[cause.where] = Invisible(cause.where, cause.title, share, experiment)
-    ranked = sorted(best.values(), key=lambda hidden: -hidden.surviving_share)
-    return [hidden for hidden in ranked if hidden.absorbed]
+    return [(candidate, hidden) for nearness, candidate, hidden in ranked if nearness < 1.0]

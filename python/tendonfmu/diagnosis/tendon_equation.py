@@ -11,8 +11,8 @@ import numpy as np
 
 from tendonfmu.arrays import Data, Flags, Indices, Numbers
 from tendonfmu.diagnosis.effects import Where
+from tendonfmu.diagnosis.effects.table import ENCODER, ZERO
 from tendonfmu.diagnosis.inputs import Input
-from tendonfmu.diagnosis.names import ENCODER, ZERO
 from tendonfmu.diagnosis.result import ChangedSize
 from tendonfmu.model import moment_arms
 from tendonfmu.recordings import Learned, Recording, TendonRouting, curves, held_on_the_way, smooth_speeds
@@ -39,15 +39,11 @@ class Off:
     @property
     def size(self) -> ChangedSize:
         """How large it was, or is described, and is now."""
-        low, high = (self.number.value + side * self.number.half for side in (-1.0, 1.0))
-        then, off = self.number.described, self.number.off
-        return ChangedSize(
-            "offset" if self.where.effect == ENCODER else self.number.path.rsplit(".", 1)[-1].split("[")[0],
-            self.unit,
-            Interval(then, then, then),
-            Interval(self.number.value, low, high),
-            Interval(off, low - then, high - then),
-        )
+        then, number = self.number.described, self.number
+        name = "offset" if self.where.effect == ENCODER else number.path.rsplit(".", 1)[-1].split("[")[0]
+        now = Interval(number.value, number.value - number.half, number.value + number.half)
+        change = Interval(number.off, now.low - then, now.high - then)
+        return ChangedSize(name, self.unit, Interval(then, then, then), now, change)
 
 
 @dataclass(frozen=True)
@@ -229,13 +225,11 @@ def _explained(off: Numbers, known_to: Numbers, arms: Numbers, sets: Iterator[Se
                 break
             # without which zero do the others agree best?
             options = np.flatnonzero(beyond > 1.0)
-            left = [_left(off, known_to, own, kept & (np.arange(len(off)) != i)) for i in options]
+            left = []
+            for others in (kept & (np.arange(len(off)) != i) for i in options):
+                offset, _ = offset_of(off[others], known_to[others], own[others])
+                left.append(float((_beyond(off, known_to, own, offset)[others] ** 2).sum()))
             kept[options[int(np.argmin(left))]] = False
-
-
-def _left(off: Numbers, known_to: Numbers, arms: Numbers, kept: Flags) -> float:
-    offset, _ = offset_of(off[kept], known_to[kept], arms[kept])
-    return float((_beyond(off, known_to, arms, offset)[kept] ** 2).sum())
 
 
 def _beyond(off: Numbers, known_to: Numbers, arms: Numbers, offset: Numbers) -> Numbers:

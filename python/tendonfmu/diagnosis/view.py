@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from scipy.special import fdtrc
 
 from tendonfmu.arrays import Array, Indices, Numbers
-from tendonfmu.diagnosis.candidate_columns import CandidateColumns, candidate_columns, hypotheses
-from tendonfmu.diagnosis.effects import CANDIDATES, Candidate, Where
+from tendonfmu.diagnosis.candidate_columns import Candidate, CandidateColumns, candidate_columns, hypotheses
+from tendonfmu.diagnosis.effects import MECHANISMS, Mechanism, Where
 from tendonfmu.diagnosis.extension_fit import FittedModel, number_columns
-from tendonfmu.diagnosis.result import Cause
 from tendonfmu.diagnosis.samples import Samples, Series, as_described
 from tendonfmu.diagnosis.selection import LeastSizes, Selection
 from tendonfmu.model import moment_arms
@@ -190,7 +189,7 @@ class View:
         return Selection(self.grams, self.candidates, self.least)
 
     @property
-    def candidates(self) -> list[Cause]:
+    def candidates(self) -> list[Candidate]:
         """All effects that the description may lack."""
         reach = np.abs(self.series.angle[self.series.used]).max(axis=0, initial=0.0)
         return hypotheses(self.columns, moment_arms(self.data), reach)
@@ -198,8 +197,8 @@ class View:
     def beside(self, keys: Collection[Where]) -> Selection:
         """Return what is missing if these causes are present, each with all its shapes at that place."""
         whole = self.selection
-        known = [cause for cause in whole.causes if cause.where in keys]
-        return Selection(self.grams, whole.causes, self.least, known, whole.shares) if known else whole
+        known = [candidate for candidate in whole.candidates if candidate.where in keys]
+        return Selection(self.grams, whole.candidates, self.least, known, whole.shares) if known else whole
 
     @cached_property
     def residual(self) -> Numbers:
@@ -210,9 +209,8 @@ class View:
     def confirmation(self) -> Confirmation:
         return Confirmation(self.series, self.folds, self.samples.splines, self.nominal)
 
-    def p_value(self, cause: Cause) -> float:
+    def p_value(self, mix: Numbers) -> float:
         """Return the probability of such a result by chance, corrected for all candidates that were tried."""
-        mix = cause.direction.mix
         used = np.flatnonzero(mix.any(axis=1))
         columns = self.columns.values[:, :, used].astype(np.float64) @ mix[used]
         return self.confirmation.p_value(columns, len(self.columns.proposals))
@@ -222,14 +220,14 @@ def look(
     data: Mapping[str, Any],
     samples: Samples,
     least: LeastSizes,
-    candidates: Sequence[Candidate] = CANDIDATES,
+    mechanisms: Sequence[Mechanism] = MECHANISMS,
     model: FittedModel | None = None,
 ) -> View:
     """Compute the view of a fitted description on samples as they were measured.
 
     `model` has the derivatives by the description's numbers, if it was fitted to the same samples.
     """
-    predicted = samples.at_predicted_forces(data) if candidates else samples
+    predicted = samples.at_predicted_forces(data) if mechanisms else samples
     nominal, scale = model.columns(samples) if model is not None else number_columns(data, predicted)
-    columns = candidate_columns(data, predicted, candidates=candidates, worth=least.worth)
+    columns = candidate_columns(data, predicted, mechanisms=mechanisms, worth=least.worth)
     return View(data, samples, predicted, samples.series(data), nominal, scale, columns, least)

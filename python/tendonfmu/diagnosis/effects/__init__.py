@@ -2,36 +2,36 @@
 
 - `table` has a row for each effect: words, places, shapes, terms.
 - `places` and `terms` hold what a row cannot say in a word; `words` puts sizes into words.
-- `candidate` says what a row is, and how it changes a description.
+- `mechanism` says what a row is, and how it changes a description.
 """
 
-from tendonfmu.diagnosis.effects.candidate import Candidate, Column, Place, Term, Variant, Where
+from tendonfmu.diagnosis.effects.mechanism import Column, Mechanism, Place, Term, Variant, Where
 from tendonfmu.diagnosis.effects.table import (
     BY_NAME,
     CALIBRATED,
     CALIBRATION,
-    CANDIDATES,
     COMMON,
+    MECHANISMS,
     OF_LAW,
-    RUBBING,
     SHARED,
     by_name,
+    title_of,
 )
 
 __all__ = [
     "BY_NAME",
     "CALIBRATED",
     "CALIBRATION",
-    "CANDIDATES",
     "COMMON",
+    "MECHANISMS",
     "OF_LAW",
-    "RUBBING",
     "SHARED",
-    "Candidate",
     "Column",
+    "Mechanism",
     "Place",
     "Term",
     "Variant",
     "Where",
     "by_name",
+    "title_of",
 ]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.arrays import Data
-from tendonfmu.diagnosis.effects.candidate import Place, Shape, magnitudes_of, row_places, sides_at
+from tendonfmu.diagnosis.effects.mechanism import Place, Shape, magnitudes_of, row_places, sides_at
 from tendonfmu.diagnosis.samples import Span
 from tendonfmu.model import EFFECT_NUMBERS, Effect, effects, moment_arms, number_of, velocity_threshold
 

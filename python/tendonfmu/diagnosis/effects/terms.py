@@ -12,21 +12,22 @@ from dataclasses import replace
 from typing import Any
 
 from tendonfmu.arrays import Data
-from tendonfmu.diagnosis.effects.candidate import (
-    ABSENT,
-    COVER,
-    POINTS,
-    SIDES,
+from tendonfmu.diagnosis.effects.mechanism import (
+    SECANT,
     Column,
     Edit,
     Place,
     Shape,
     Term,
     Variant,
-    apply_edits,
+    add_cover,
+    add_law,
+    add_points,
+    add_sides,
     law_columns,
     magnitudes_of,
     sides_at,
+    with_rows,
 )
 from tendonfmu.diagnosis.effects.places import ANGLES, largest_coulomb, law_path, laws_at
 from tendonfmu.estimate import get_number
@@ -68,9 +69,9 @@ def secant(number: str, *, most: float = math.inf) -> Make:
     def make(name: str, data: Data, place: Place, shape: Shape) -> Variant:
         def full(factor: float) -> dict[str, Any]:
             value = float(shape[number]) * factor
-            return apply_edits(data, (), [_row(name, place, {number: min(max(value, -most), most)})], {})
+            return with_rows(data, _row(name, place, {number: min(max(value, -most), most)}))
 
-        return Variant(data, shape, full=full)
+        return Variant(data, shape, SECANT, full=full)
 
     return make
 
@@ -91,7 +92,7 @@ def delay(name: str, data: Data, place: Place, shape: Shape) -> Variant:
 
 def changed_law(term: Term) -> str | None:
     """Return the path of the law that a term changes; None if it adds a law or a row."""
-    make, shape = term.candidate.make, term.shape
+    make, shape = term.mechanism.make, term.shape
     if make in (viscous, sides) or (make is stribeck and not shape.get("rises")):
         return law_path(term.place, shape)
     return law_path(term.place, {}) if make is edge and shape else None
@@ -108,7 +109,7 @@ def absent_law(**kind: float) -> Make:
             Column({f"{path}.coulomb": 1.0}, 1, coulomb),
             Column({f"{path}.viscous": 1.0}, 1, _SLOW_SHARE * coulomb / speed),
         )
-        return Variant(data, shape, columns, (Edit(ABSENT, path),))
+        return Variant(data, shape, columns, Edit(path, add_law))
 
     return make
 
@@ -118,10 +119,10 @@ def edge(name: str, data: Data, place: Place, shape: Shape) -> Variant:
     if not shape:
         return absent_law()(name, data, place, shape)
     path = law_path(place, {})
-    edits = (Edit(POINTS, path, tuple(float(shape[key]) for key in ANGLES)),)
-    pointed = apply_edits(data, edits, (), {})
+    edit = Edit(path, add_points([float(shape[key]) for key in ANGLES]))
+    pointed = edit.made(data)
     ends = (_law_shares(pointed, f"{path}.laws[{point}]") for point in (1, 3))
-    return Variant(data, shape, tuple(Column(numbers, 0, _BENT) for numbers in ends), edits)
+    return Variant(data, shape, tuple(Column(numbers, 0, _BENT) for numbers in ends), edit)
 
 
 def _law_shares(data: Data, path: str) -> dict[str, float]:
@@ -157,14 +158,14 @@ def stribeck(name: str, data: Data, place: Place, shape: Shape) -> Variant:
     effect = next(law for law in laws_at(data, place) if law.path == path)
     numbers = {at: 1.0 for at, _ in law_columns(data, path, ["static"])}
     column = Column(numbers, 1, _DROP * largest_coulomb(data, effect))
-    return Variant(data, shape, (column,), settings={path: velocity})
+    return Variant(data, shape, (column,), setting=(path, velocity))
 
 
 def sides(name: str, data: Data, place: Place, shape: Shape) -> Variant:
     """Return a law with two sides; its magnitude is the difference between them in shares of the law."""
     path = law_path(place, shape)
-    edits = (Edit(SIDES, path),)
-    split = apply_edits(data, edits, (), {})
+    edit = Edit(path, add_sides)
+    split = edit.made(data)
     dry: dict[str, float] = {}
     thick: dict[str, float] = {}
     values = [magnitudes_of(side) for side in sides_at(split, path)]
@@ -174,10 +175,10 @@ def sides(name: str, data: Data, place: Place, shape: Shape) -> Variant:
         dry |= {f"{law}.coulomb": half * coulomb} | ({f"{law}.static": half * drop} if drop else {})
         thick |= {f"{law}.viscous": half * viscous} if viscous else {}
     columns = tuple(Column(numbers, 0, _ASYMMETRY) for numbers in (dry, thick) if numbers)
-    return Variant(data, shape, columns, edits)
+    return Variant(data, shape, columns, edit)
 
 
 def spring(name: str, data: Data, place: Place, shape: Shape) -> Variant:
     """Return the spring of a cover at a joint without one."""
     path = f"joints[{place.joint}]"
-    return Variant(data, shape, (Column({f"{path}.cover.stiffness": 1.0}, 1, _SPRING),), (Edit(COVER, path),))
+    return Variant(data, shape, (Column({f"{path}.cover.stiffness": 1.0}, 1, _SPRING),), Edit(path, add_cover))

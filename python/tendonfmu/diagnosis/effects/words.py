@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from tendonfmu.diagnosis.effects.candidate import Sizes
+from tendonfmu.diagnosis.effects.mechanism import Sizes
 from tendonfmu.model import LEFT_OUT
 from tendonfmu.statistics import Interval
 

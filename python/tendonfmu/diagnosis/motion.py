@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.arrays import Data, Numbers
-from tendonfmu.diagnosis.experiments.menu import Entry, Section, entry_from_json, own_tension
+from tendonfmu.diagnosis.menu import Entry, Section, entry_from_json, own_tension
 from tendonfmu.errors import InputError
 from tendonfmu.excite import Excitation, Plan, plan_excitation
 from tendonfmu.model import balanced_forces, moment_arms, tendon_positions

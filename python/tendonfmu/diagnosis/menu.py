@@ -174,19 +174,15 @@ def _long_enough(section: Section) -> Section:
 
 
 def _one_at_a_time(recorded: Recorded, usual: Section) -> Entry:
-    middle = recorded.ranges.mean(axis=1)
-    sections = []
+    middle, sections = recorded.ranges.mean(axis=1), []
     for j in range(len(middle)):
         ranges = np.column_stack([middle, middle])
         ranges[j] = recorded.ranges[j]
         alone = replace(usual, ranges=_as_ranges(ranges), seconds=max(SECONDS / len(middle), 16.0))
         sections.append(_long_enough(alone))
-    what = (
-        "motion of one joint at a time, with the others at rest"
-        if len(middle) > 1
-        else "the same kind of motion, in two halves"
-    )
-    return Entry(what, tuple(sections if len(middle) > 1 else [replace(sections[0], seconds=SECONDS / 2)] * 2))
+    if len(middle) == 1:
+        return Entry("the same kind of motion, in two halves", (replace(sections[0], seconds=SECONDS / 2),) * 2)
+    return Entry("motion of one joint at a time, with the others at rest", tuple(sections))
 
 
 def _small_strokes(recorded: Recorded, usual: Section) -> Entry:

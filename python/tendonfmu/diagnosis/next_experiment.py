@@ -19,10 +19,10 @@ import numpy as np
 
 from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.candidate_columns import CandidateColumns, Proposal, candidate_columns
-from tendonfmu.diagnosis.effects import Candidate, Term, Where
-from tendonfmu.diagnosis.experiments.menu import Entry, combined, loads, motions, own_tension, recorded_of, tensions
-from tendonfmu.diagnosis.experiments.motion import expected_recording, perform
+from tendonfmu.diagnosis.effects import Mechanism, Term, Where
 from tendonfmu.diagnosis.extension_fit import number_columns
+from tendonfmu.diagnosis.menu import Entry, combined, loads, motions, own_tension, recorded_of, tensions
+from tendonfmu.diagnosis.motion import expected_recording, perform
 from tendonfmu.diagnosis.names import Names, at_place, names_in
 from tendonfmu.diagnosis.result import Experiment
 from tendonfmu.diagnosis.samples import Samples, Span, span_of
@@ -98,11 +98,8 @@ class Experiments:
         if not self.answers:
             return self.best.sentence
         answer = self.answers[number]
-        return (
-            answer.entry.sentence
-            if answer.separates
-            else f"{NONE} show it. {answer.question.cause.candidate.explanation}"
-        )
+        explanation = answer.question.cause.mechanism.explanation
+        return answer.entry.sentence if answer.separates else f"{NONE} show it. {explanation}"
 
 
 def plan_experiments(
@@ -127,7 +124,7 @@ def plan_experiments(
     scores = []
     # effects that only change over time show in long recordings, which take long to predict
     slow = any(
-        cause is not None and cause.candidate.coordinate == "time" for q in questions for cause in (q.cause, q.rival)
+        cause is not None and cause.mechanism.coordinate == "time" for q in questions for cause in (q.cause, q.rival)
     )
     first = [*plain, *varied, *([long] if slow else [])]
     for k, entry in enumerate(first):
@@ -177,7 +174,7 @@ class _Laboratory:
         self.kinematics = recordings[0].kinematics
         given = [number_of(data, "bias.noise_std")] * len(data["joints"]) if noise is None else list(noise)
         self.noise = np.maximum(np.array(given, dtype=float), 1e-9)
-        self.candidates = [_restricted(candidate, data, span) for candidate in _asked(questions)]
+        self.mechanisms = [_restricted(cause, data, span) for cause in _asked(questions)]
         self.columns: CandidateColumns | None = None
         self.nominal_count = 0
         self.old = sum(
@@ -203,7 +200,7 @@ class _Laboratory:
 
     def _look(self, recording: FitRecording) -> _Seen:
         samples = Samples.of(self.data, [recording])
-        columns = candidate_columns(self.data, samples, candidates=self.candidates, span=self.span)
+        columns = candidate_columns(self.data, samples, mechanisms=self.mechanisms, span=self.span)
         nominal, _ = number_columns(self.data, samples)
         self.columns, self.nominal_count = columns, nominal.shape[2]
         values = np.concatenate([nominal, columns.values], axis=2).astype(np.float64) / self.noise[:, None]
@@ -228,7 +225,8 @@ class _Laboratory:
         """Return the power of the cause at its magnitudes that neither the model nor the rival explains."""
         explaining = list(range(self.nominal_count))
         if question.rival is not None:
-            explaining += self._all_columns(question.rival)
+            columns = [proposal.columns for proposal in self._proposals(question.rival)]
+            explaining += range(self.nominal_count + columns[0].start, self.nominal_count + columns[-1].stop)
         return _schur(gram, self._direction(question.cause), explaining)
 
     def _proposals(self, cause: Term) -> list[Proposal]:
@@ -237,11 +235,11 @@ class _Laboratory:
         proposals = [
             proposal
             for proposal in self.columns.proposals
-            if proposal.candidate.name == cause.candidate.name and proposal.place == cause.place
+            if proposal.mechanism.name == cause.mechanism.name and proposal.place == cause.place
         ]
         if not proposals:
             raise InternalError(
-                f"{cause.candidate.name}: not possible at this place; expected a place of the candidate"
+                f"{cause.mechanism.name}: not possible at this place; expected a place of the mechanism"
             )
         return proposals
 
@@ -249,16 +247,9 @@ class _Laboratory:
         """Return the magnitudes of the cause in all columns [c]."""
         assert self.columns is not None
         proposal = self._proposals(cause)[0]
-        given = list(cause.magnitudes) if len(cause.magnitudes) else list(proposal.variant.expected)
         direction = np.zeros(self.nominal_count + self.columns.values.shape[2])
-        direction[self.nominal_count + proposal.columns.start : self.nominal_count + proposal.columns.stop] = given
+        direction[self.nominal_count :][proposal.columns] = cause.magnitudes or proposal.variant.expected
         return direction
-
-    def _all_columns(self, cause: Term) -> list[int]:
-        proposals = self._proposals(cause)
-        return list(
-            range(self.nominal_count + proposals[0].columns.start, self.nominal_count + proposals[-1].columns.stop)
-        )
 
     def _rows(self, cause: Term, seen: _Seen) -> float:
         """Return the number of blocks times joints in which the cause makes a noticeable torque."""
@@ -284,22 +275,20 @@ def _schur(gram: Numbers, direction: Numbers, explaining: Sequence[int]) -> floa
 
 
 def _asked(questions: Sequence[Question]) -> list[Term]:
-    """Return every candidate at a place once, with the shape of its first mention."""
+    """Return every mechanism at a place once, with the shape of its first mention."""
     causes: dict[tuple[str, Any], Term] = {}
-    for question in questions:
-        for cause in (question.cause, question.rival):
-            if cause is not None:
-                causes.setdefault((cause.candidate.name, cause.place), cause)
+    for cause in (cause for question in questions for cause in (question.cause, question.rival) if cause is not None):
+        causes.setdefault((cause.mechanism.name, cause.place), cause)
     return list(causes.values())
 
 
-def _restricted(cause: Term, data: Data, span: Span) -> Candidate:
-    """Return the candidate at that place only; its own shape comes first, then the others of its grid."""
-    grid = cause.candidate.find_shapes(data, cause.place, span)
+def _restricted(cause: Term, data: Data, span: Span) -> Mechanism:
+    """Return the mechanism at that place only; its own shape comes first, then the others of its grid."""
+    grid = cause.mechanism.find_shapes(data, cause.place, span)
     own = dict(cause.shape) or (dict(grid[len(grid) // 2]) if grid else {})
     shapes = [own, *(shape for shape in grid if dict(shape) != own)]
     return replace(
-        cause.candidate,
+        cause.mechanism,
         possible_places=lambda *_: [cause.place],
         find_shapes=lambda *_: [dict(shape) for shape in shapes],
     )
@@ -308,14 +297,10 @@ def _restricted(cause: Term, data: Data, span: Span) -> Candidate:
 def _mean_load(data: Data, recordings: Sequence[FitRecording]) -> Numbers:
     """Return the mean known load on the joints, N·m [n]."""
     arms = moment_arms(data)
-    loads = [
-        (recording.recording.groups["tendon_force"] @ arms - recording.target).mean(axis=0) for recording in recordings
-    ]
-    return (
-        np.asarray(np.mean(loads, axis=0))
-        if any(recording.external is not None for recording in recordings)
-        else np.zeros(arms.shape[1])
-    )
+    if all(recording.external is None for recording in recordings):
+        return np.zeros(arms.shape[1])
+    pulled = [(recording.recording.groups["tendon_force"] @ arms - recording.target) for recording in recordings]
+    return np.asarray(np.mean([load.mean(axis=0) for load in pulled], axis=0))
 
 
 def _shortened(recording: FitRecording) -> FitRecording:
@@ -380,16 +365,16 @@ def _sentence(separating: Sequence[Answer], names: Names) -> str:
     first, *others = separating
     shown, rival = first.question.cause, first.question.rival
     causes = [cause for cause in (shown, rival) if cause is not None]
-    what = "; and ".join(at_place(cause.candidate.title, cause.where, names) for cause in causes)
+    what = "; and ".join(at_place(cause.mechanism.title, cause.where, names) for cause in causes)
     if not first.separates:
         verb = "show this" if rival is None else "distinguish these two"
-        return f"{NONE} {verb}: {what}. {shown.candidate.explanation}"
+        return f"{NONE} {verb}: {what}. {shown.mechanism.explanation}"
     if rival is not None:
         purpose = f"It distinguishes two causes that look alike in the present recordings: {what}."
     else:
         hides = "other numbers of the model imitate it" if first.question.absorbed else "the noise hides it"
         purpose = f"That would show: {what}. In the present recordings {hides}."
-    titles = dict.fromkeys(answer.question.cause.candidate.title for answer in others)
+    titles = dict.fromkeys(answer.question.cause.mechanism.title for answer in others)
     more = [title for title in titles if title not in what]
     rest = [f"{len(more) - LISTED} more"] * (len(more) > LISTED)
     also = f" It would also help to see: {'; '.join([*more[:LISTED], *rest])}." if more else ""

@@ -1,6 +1,6 @@
-"""What a candidate for a cause is: where it can be, which numbers it has, and how it is added to a description.
+"""What a mechanism is: where it can be, which numbers it has, and how it is added to a description.
 
-A candidate holds no formula. It says how to add its term to a finger description at a strength of zero. The columns
+A mechanism holds no formula. It says how to add its term to a finger description at a strength of zero. The columns
 that the diagnosis compares with the residual are the C core's own derivatives by the term's numbers there. If the term
 has no useful derivative at zero, the column is the difference of the core's torque with and without it.
 """
@@ -25,70 +25,69 @@ from tendonfmu.model import law_path
 # two sides or several working points starts with equal sides and equal laws. Paths are those of the FMU's parameters.
 
 
-ABSENT, POINTS, SIDES, COVER = "absent", "points", "sides", "cover"  # kinds of edits, in their order
 _NEXT_TO_NONE = 1e-15  # of the force, or N·m
-_ORDER = (ABSENT, POINTS, SIDES, COVER)
+_ABSENT = {"static": _NEXT_TO_NONE, "coulomb": _NEXT_TO_NONE, "stribeck_velocity": 1.0, "viscous": 0.0}
 
 
 @dataclass(frozen=True)
 class Edit:
     """A change of a description."""
 
-    kind: str  # "absent": a law where there was none
     path: str  # of the effect or of the joint
-    angles: tuple[float, ...] = ()  # of the working points, rad
+    make: Callable[[dict[str, Any], str], None]
+
+    def made(self, data: Data) -> dict[str, Any]:
+        """Return a copy of a description with the change."""
+        result = own_copy(data)
+        self.make(result, self.path)
+        return result
 
 
-def apply_edits(
-    data: Data, edits: Iterable[Edit], rows: Sequence[Mapping[str, Any]], settings: Mapping[str, float]
-) -> dict[str, Any]:
-    """Return a copy with the edits made, rows added to `extensions` and Stribeck velocities set."""
-    result = own_copy(data)
-    for edit in sorted(edits, key=lambda edit: _ORDER.index(edit.kind)):
-        _MAKE[edit.kind](result, edit)
-    for path, velocity in settings.items():
-        for side in sides_at(result, path):
-            side["stribeck_velocity"] = velocity
-    if rows:
-        result["extensions"] = [*(result.get("extensions") or []), *({**row} for row in rows)]
-    return result
-
-
-def _add_law(data: dict[str, Any], edit: Edit) -> None:
-    law = {"static": _NEXT_TO_NONE, "coulomb": _NEXT_TO_NONE, "stribeck_velocity": 1.0, "viscous": 0.0}
-    place = law_path(edit.path)
+def add_law(data: dict[str, Any], path: str) -> None:
+    """Add a law where there was none."""
+    place = law_path(path)
     if place is None or place.tendon is None:
-        set_number(data, edit.path, law)  # type: ignore[arg-type]
+        set_number(data, path, dict(_ABSENT))  # type: ignore[arg-type]
         return
     tendon = data["tendons"][place.tendon - 1]
     entries = list(tendon.get(place.kind) or [])
     entries += [None] * (place.joint - len(entries))
-    entries[place.joint - 1] = law
+    entries[place.joint - 1] = dict(_ABSENT)
     tendon[place.kind] = entries
 
 
-def _add_points(data: dict[str, Any], edit: Edit) -> None:
-    law = get_number(data, edit.path)
-    laws = [own_copy(law) for _ in edit.angles]
-    set_number(data, edit.path, {"angles": list(edit.angles), "laws": laws})  # type: ignore[arg-type]
+def add_points(angles: Sequence[float]) -> Callable[[dict[str, Any], str], None]:
+    """Return a function that gives a law working points at these angles, rad."""
+
+    def add(data: dict[str, Any], path: str) -> None:
+        law = get_number(data, path)
+        laws = [own_copy(law) for _ in angles]
+        set_number(data, path, {"angles": list(angles), "laws": laws})  # type: ignore[arg-type]
+
+    return add
 
 
-def _add_sides(data: dict[str, Any], edit: Edit) -> None:
-    law = get_number(data, edit.path)
-    for one in laws_of(law):
+def add_sides(data: dict[str, Any], path: str) -> None:
+    """Split the laws at a path into two sides."""
+    for one in laws_of(get_number(data, path)):
         if one.get("positive") is None:
             both = {side: dict(one) for side in ("positive", "negative")}
             one.clear()
             one.update(both)
 
 
-def _add_cover(data: dict[str, Any], edit: Edit) -> None:
-    joint = get_number(data, edit.path)
-    cover = joint.get("cover") or {}
-    joint["cover"] = {"stiffness": 0.0, "rest_angle": float(cover.get("rest_angle") or 0.0)}
+def add_cover(data: dict[str, Any], path: str) -> None:
+    """Add a cover without stiffness to a joint."""
+    joint = get_number(data, path)
+    joint["cover"] = {"stiffness": 0.0, "rest_angle": float((joint.get("cover") or {}).get("rest_angle") or 0.0)}
 
 
-_MAKE = {ABSENT: _add_law, POINTS: _add_points, SIDES: _add_sides, COVER: _add_cover}
+def with_rows(data: Data, *rows: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a copy of a description with further rows of `extensions`."""
+    result = own_copy(data)
+    if rows:
+        result["extensions"] = [*(result.get("extensions") or []), *({**row} for row in rows)]
+    return result
 
 
 # --- laws -------------------------------------------------------------------------------------------------------------
@@ -140,17 +139,16 @@ def data_number(data: Data, path: str) -> float:
     return float(value or 0.0)
 
 
-def raise_to(data: dict[str, Any], edits: Iterable[Edit], settings: Mapping[str, float], share: float) -> None:
-    """Keep every number of the edited laws valid and present: at least `share` of its law's Coulomb friction."""
-    for path in {edit.path for edit in edits if edit.kind != COVER} | set(settings):
-        sides = sides_at(data, path)
-        largest = max(abs(float(side["static"])) for side in sides) or 1e-6
-        for side in sides:
-            drop = float(side["static"]) - float(side["coulomb"])
-            side["coulomb"] = max(float(side["coulomb"]), share * largest)
-            side["static"] = side["coulomb"] + max(drop, 0.0)
-            if side.get("viscous") is not None:
-                side["viscous"] = max(float(side["viscous"]), 0.0)
+def raise_to(data: dict[str, Any], path: str, share: float) -> None:
+    """Keep every number of the laws at a path valid and present: at least `share` of the law's Coulomb friction."""
+    sides = sides_at(data, path)
+    largest = max(abs(float(side["static"])) for side in sides) or 1e-6
+    for side in sides:
+        drop = float(side["static"]) - float(side["coulomb"])
+        side["coulomb"] = max(float(side["coulomb"]), share * largest)
+        side["static"] = side["coulomb"] + max(drop, 0.0)
+        if side.get("viscous") is not None:
+            side["viscous"] = max(float(side["viscous"]), 0.0)
 
 
 def magnitudes_of(side: Mapping[str, Any]) -> tuple[float, float, float]:
@@ -194,64 +192,55 @@ class Column:
     expected: float  # magnitude of an ordinary effect, > 0; a fit without better knowledge starts there
     least: float = -math.inf  # smallest magnitude that the description accepts
 
-    @property
-    def path(self) -> str:
-        """The first number that it moves."""
-        return next(iter(self.numbers))
+
+SECANT = (Column({}, 1, 1.0),)  # of a term at full strength
 
 
 @dataclass(frozen=True)
 class Variant:
-    """A candidate at one place and one point of the grid of its non-linear numbers."""
+    """A mechanism at one place and one point of the grid of its non-linear numbers."""
 
     base: Data  # the description without the term
     shape: Shape  # the non-linear numbers here
-    columns: tuple[Column, ...] = ()  # derivatives to compute
-    # what is added at a strength of zero: changes of laws and covers, and rows of `extensions`
-    edits: tuple[Edit, ...] = ()
+    columns: tuple[Column, ...]  # derivatives to compute
+    # what is added at a strength of zero: a change of laws or of a cover, or a row of `extensions`
+    edit: Edit | None = None
     rows: tuple[Mapping[str, Any], ...] = ()
-    # numbers of laws without a meaning at strength zero: path of the law -> Stribeck velocity
-    settings: Mapping[str, float] | None = None
+    # a number of laws without a meaning at strength zero: path of the law and its Stribeck velocity
+    setting: tuple[str, float] | None = None
     full: Callable[[float], dict[str, Any]] | None = None  # magnitude -> the description with a term of no derivative
     late: float = 0.0  # by how much forces come later than positions, s
 
     @cached_property
     def data(self) -> dict[str, Any]:
         """The description with the term added at a strength of zero."""
-        return apply_edits(self.base, self.edits, self.rows, self.settings or {})
-
-    @property
-    def secant(self) -> dict[str, Any] | None:
-        """The description with the term, if its column is a difference of torques."""
-        return self.full(1.0) if self.full is not None else None
+        return self.at((0.0,) * self.count)
 
     def at(self, magnitudes: Sequence[float]) -> dict[str, Any]:
         """Return the description with the term at exactly these magnitudes, one per column."""
-        result = apply_edits(self.base, self.edits, self.rows, self.settings or {})
+        result = with_rows(self.base if self.edit is None else self.edit.made(self.base), *self.rows)
+        if self.setting is not None:
+            for side in sides_at(result, self.setting[0]):
+                side["stribeck_velocity"] = self.setting[1]
         for column, magnitude in zip(self.columns, magnitudes, strict=True):
             for path, share in column.numbers.items() if magnitude else ():
                 add_to_number(result, path, magnitude * share)
         return result
 
     @property
-    def paths(self) -> tuple[str, ...]:
-        """First number of each column; "" for a column at full strength."""
-        return ("",) if self.full is not None else tuple(column.path for column in self.columns)
-
-    @property
     def signs(self) -> tuple[int, ...]:
         """Expected sign of each column's magnitude."""
-        return (1,) if self.full is not None else tuple(column.sign for column in self.columns)
+        return tuple(column.sign for column in self.columns)
 
     @property
     def expected(self) -> tuple[float, ...]:
         """Magnitudes of an ordinary effect."""
-        return (1.0,) if self.full is not None else tuple(column.expected for column in self.columns)
+        return tuple(column.expected for column in self.columns)
 
     @property
     def count(self) -> int:
         """Number of columns."""
-        return 1 if self.full is not None else len(self.columns)
+        return len(self.columns)
 
     def extended(self, magnitudes: Sequence[float]) -> dict[str, Any]:
         """Return the description with the term at these magnitudes, one per column, none of its numbers at zero."""
@@ -261,12 +250,11 @@ class Variant:
             raise InputError(f"magnitudes: {counted(len(magnitudes), 'number')}; expected {self.count}, one per column")
         if self.full is not None:
             return self.full(min(max(float(magnitudes[0]), 0.2), 5.0))
-        result = apply_edits(self.base, self.edits, self.rows, self.settings or {})
-        for column, magnitude in zip(self.columns, magnitudes, strict=True):
-            value = max(_present(column, float(magnitude)), column.least)
-            for path, share in column.numbers.items():
-                add_to_number(result, path, value * share)
-        raise_to(result, self.edits, self.settings or {}, LEAST_SHARE)
+        both = zip(self.columns, magnitudes, strict=True)
+        result = self.at([max(_present(column, float(magnitude)), column.least) for column, magnitude in both])
+        changed = self.setting[0] if self.setting is not None else self.edit.path if self.edit is not None else ""
+        if changed and law_path(changed) is not None:  # a cover has none
+            raise_to(result, changed, LEAST_SHARE)
         return result
 
 
@@ -289,7 +277,7 @@ def no_shape(data: Data, place: Place, span: Span) -> list[dict[str, float]]:
 
 
 @dataclass(frozen=True)
-class Candidate:
+class Mechanism:
     """One effect of docs/reference/commands/diagnose.md."""
 
     name: str
@@ -326,9 +314,9 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Term:
-    """A candidate at a place, as it is added to a description."""
+    """A mechanism at a place, as it is added to a description."""
 
-    candidate: Candidate
+    mechanism: Mechanism
     place: Place
     shape: Shape = field(default_factory=dict)  # its non-linear numbers
     magnitudes: Sequence[float] = ()  # one per column, as estimated so far; () for an ordinary size
@@ -336,11 +324,11 @@ class Term:
 
     @property
     def where(self) -> Where:
-        return Where(self.candidate.name, *self.place)
+        return Where(self.mechanism.name, *self.place)
 
     def added_to(self, data: Data) -> dict[str, Any]:
         """Return the description with this term."""
-        return self.candidate.extended(data, self.place, self.shape, self.magnitudes)
+        return self.mechanism.extended(data, self.place, self.shape, self.magnitudes)
 
     def times(self, factors: Sequence[float]) -> Term:
         """Return the term with each magnitude multiplied by its factor."""
