@@ -61,7 +61,7 @@ def fit_all(finger: Finger, recordings: Sequence[FitRecording], *, threads: int,
     kept = [without_events(recording, events) for recording in recordings]
     structure = build_structure(finger, Choice(fix=torque_scales(finger.data)))
     settings = replace(settings_of(finger.data, kept, threads), near=True)
-    learned = learn_batch(structure, kept, Watch(None), settings, None)
+    learned = learn_batch(structure, kept, Watch(None), settings)
     result = with_values(structure, np.asarray(learned.estimator.values(learned.z)))
     result = with_learned_numbers(structure, learned, result)
     return CalibratedFit(result.data, events, tuple(learned.warnings))

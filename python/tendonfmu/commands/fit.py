@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 class FitInterrupted(KeyboardInterrupt):
-    """Ctrl-C ended a fit; `unfinished` holds its best estimate so far."""
+    """Ctrl-C ended a fit; `unfinished` is the finger with its best estimate so far."""
 
     def __init__(self, unfinished: Any) -> None:
         super().__init__("fit interrupted")
@@ -205,7 +205,7 @@ def fit_files(
     progress: Progress = None,
 ) -> None:
     """Ctrl-C saves the best estimate so far in FITTED.unfinished.json."""
-    inputs = [finger, *recordings, *options.files("compare", "previous", "resume")]
+    inputs = [finger, *recordings, *options.files("compare", "previous")]
     estimate.check_outputs(output, report, figures, inputs)
     if ssv is not None:
         fmu.check_parameter_set_path(ssv, *inputs)
@@ -214,8 +214,9 @@ def fit_files(
             warnings.simplefilter("ignore", estimate.FitWarning)  # printed with the result, one line each
             result = fit(finger, recordings, **vars(options) | {"progress": bar.fit})
     except FitInterrupted as stopped:
-        left = estimate.write_unfinished(output, stopped.unfinished)
-        fail(f"interrupted; the best estimate so far is in {left}; continue with --resume {left}")
+        left = output.with_name(f"{output.stem}.unfinished.json")
+        stopped.unfinished.write(left)
+        fail(f"interrupted; the best estimate so far is in {left}, a description that fit can start from")
         sys.exit(INTERRUPTED)
     if ssv is not None:
         result.write(ssv)

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
         known_numbers,
         read_previous_fit,
         with_previous_values,
-        write_unfinished,
     )
     from .fisher_information import Noise, Progress, information, noise_of, sensitivities, unknowns
     from .fit_report import FitPicture, FitSeries, LawBands, LawCurve, asymmetric, evaluate, numbers_of, unseen_square

@@ -31,7 +31,7 @@ from tendonfmu.estimate.memory import (
 )
 from tendonfmu.estimate.memory_fit import MemoryProblem, Minimum, minimise
 from tendonfmu.estimate.memory_methods import STEP, coarse_problem, from_starts, full_problem, guess_prior, no_show
-from tendonfmu.estimate.methods import Start, learn_batch
+from tendonfmu.estimate.methods import learn_batch
 from tendonfmu.estimate.structure import Choice, Structure, build_structure, model_alone, with_values
 from tendonfmu.model import Finger, effects, finger_from_data, moment_arms, native, number_of
 from tendonfmu.recordings import FitRecording, best_angles, make_grid
@@ -298,11 +298,10 @@ def learn_remembered(
     recordings: Sequence[FitRecording],
     watch: Watch,
     settings: Settings,
-    start: Start | None,
 ) -> Remembered:
     """Fit a structure with presliding. Raises Interrupted."""
     best = best_angles(structure.start.data, recordings)
-    learn = partial(_with_what_shows, structure, choice, watch=watch, settings=settings, start=start)
+    learn = partial(_with_what_shows, structure, choice, watch=watch, settings=settings)
     found, learned, gone = learn(best.recordings)
     data = _fitted(found, learned)
     source, left, delivered = best.source, left_without_bias(data, best.recordings), left_without_bias(data, recordings)
@@ -322,22 +321,17 @@ def _with_what_shows(
     *,
     watch: Watch,
     settings: Settings,
-    start: Start | None,
 ) -> tuple[Structure, Learned, list[str]]:
     """Fit, and fit again without what the motion does not show."""
-    learned, gone = learn_batch(structure, recordings, watch, settings, start), []
+    learned, gone = learn_batch(structure, recordings, watch, settings), []
     while path := _not_shown(structure, learned):
         fitted = with_values(structure, np.asarray(learned.estimator.values(learned.z)))
         values = dict(zip(unknown_names(learned.estimator), learned.z.tolist(), strict=True))
         gone.append(path)
         data = without_time(structure.start.data, path)
         structure = build_structure(finger_from_data(data, fitted.path), choice)
-        learned = learn_batch(structure, recordings, watch, replace(settings, near=True), _start_at(values))
+        learned = learn_batch(structure, recordings, watch, replace(settings, near=True), values)
     return structure, learned, gone
-
-
-def _start_at(values: dict[str, float]) -> Start:
-    return lambda names: np.array([values[name] for name in names])
 
 
 def _not_shown(structure: Structure, learned: Learned) -> str | None:
