@@ -16,8 +16,8 @@ from fit_finger import made_recording, moved_start
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import FrictionFit, known_numbers
 from tendonfmu.estimate.files import with_estimates
-from tendonfmu.estimate.structure import estimable_numbers, get_number, set_number
-from tendonfmu.model import native, read_finger
+from tendonfmu.estimate.structure import estimable_numbers
+from tendonfmu.model import get_number, native, read_finger, set_number
 from tendonfmu.recordings import Recording
 
 pytestmark = pytest.mark.filterwarnings("ignore::tendonfmu.estimate.fitting.FitWarning")

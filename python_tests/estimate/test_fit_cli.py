@@ -16,7 +16,7 @@ import pytest
 from command import Answer, Call
 from fit_finger import made_recording, moved_start, write_recording
 from repository_paths import ROOT
-from tendonfmu.estimate.structure import get_number
+from tendonfmu.model import get_number
 
 needs_proc = pytest.mark.skipif(
     not Path("/proc/self").is_dir(), reason="SKIPPED: no folder here that nobody may write into"

@@ -15,8 +15,8 @@ from fit_cases import small_finger
 from fit_finger import asymmetric_finger, made_recording, moved_start
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.fitting import FrictionFit
-from tendonfmu.estimate.structure import get_number, set_number, with_sides
-from tendonfmu.model import native
+from tendonfmu.estimate.structure import with_sides
+from tendonfmu.model import get_number, native, set_number
 
 pytestmark = pytest.mark.filterwarnings("ignore::tendonfmu.estimate.fitting.FitWarning")
 

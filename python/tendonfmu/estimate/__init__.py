@@ -10,7 +10,7 @@ from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from . import identifiability, verdicts
-    from .core_runs import CoreRuns, SlowDrift, slowest_drift
+    from .core_runs import CoreRuns, SlowDrift, image_that_holds, slowest_drift
     from .estimation import ESTIMATION_MISSING, HAS_ESTIMATION, EstimationError, Estimator, Unknown
     from .files import (
         FIT_REPORT,
@@ -46,10 +46,6 @@ if TYPE_CHECKING:
         Choice,
         Structure,
         build_structure,
-        described,
-        get_number,
-        own_copy,
-        set_number,
         torque_scales,
         with_values,
     )

@@ -15,9 +15,9 @@ from tendonfmu.arrays import Data, Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.fisher_information import Unknown
 from tendonfmu.estimate.identifiability import LIMIT
-from tendonfmu.estimate.structure import MAGNITUDES, described, estimable_numbers, own_copy, set_number
+from tendonfmu.estimate.structure import MAGNITUDES, estimable_numbers
 from tendonfmu.files import check_output, check_output_folder, read_json
-from tendonfmu.model import Finger, finger_from_data, read_finger
+from tendonfmu.model import Finger, own_copy, read_finger, set_number
 from tendonfmu.recordings import Recording
 
 FIT_REPORT = "tendonfmu-fit-1"
@@ -150,7 +150,7 @@ def with_previous_values(finger: Finger, previous: PreviousFit) -> Finger:
         for path in (number.path, number.with_path):
             if path is not None:
                 set_number(data, path, previous.values[number.path])
-    return described(finger, data)
+    return finger.with_data(data)
 
 
 # --- `estimated` in a description -------------------------------------------------------------------------------------
@@ -172,7 +172,7 @@ def with_estimates(finger: Finger, numbers: Sequence[Unknown], covariance: Numbe
         entries.pop(path, None)
         if error <= LIMIT * float(weight @ size):
             entries[path] = [float(weight @ value), float(f"{error:.{DIGITS}g}")]
-    return finger_from_data({**finger.data, "estimated": entries or None}, finger.path)
+    return finger.with_data({**finger.data, "estimated": entries or None})
 
 
 def known_numbers(data: Data) -> dict[str, tuple[float, float]]:

@@ -32,8 +32,8 @@ from tendonfmu.estimate.memory import (
 from tendonfmu.estimate.memory_fit import MemoryProblem, Minimum, minimise
 from tendonfmu.estimate.memory_methods import STEP, coarse_problem, from_starts, full_problem, guess_prior, no_show
 from tendonfmu.estimate.methods import learn_batch
-from tendonfmu.estimate.structure import Choice, Structure, build_structure, model_alone, with_values
-from tendonfmu.model import Finger, effects, finger_from_data, moment_arms, native, number_of
+from tendonfmu.estimate.structure import Choice, Structure, build_structure, with_values
+from tendonfmu.model import Finger, effects, moment_arms, native, number_of
 from tendonfmu.recordings import FitRecording, best_angles, make_grid
 
 Rows = tuple[dict[str, Any], ...]
@@ -138,13 +138,12 @@ class _Search:
     def _structure(self, rows: Rows) -> tuple[Structure, Estimator]:
         data = with_rows(self._finger.data, *rows)
         choice = replace(self._choice, share=(*self._choice.share, *_shared(rows)))
-        structure = build_structure(finger_from_data(data, self._finger.path), choice)
+        structure = build_structure(self._finger.with_data(data), choice)
         return structure, Estimator(structure.start.image, structure.group, structure.scale)
 
     def _numbers_of(self, estimator: Estimator, data: Data) -> Numbers:
         """Return the unknowns z [u] of a description of the same structure."""
-        bare = finger_from_data(model_alone(data), self._finger.path)
-        return estimator.unknown_values(native.Instance(bare.image).values())
+        return estimator.unknown_values(native.Instance(self._finger.with_data(data).model.image).values())
 
 
 def held_out_errors(problem: MemoryProblem, found: Minimum, variance: Numbers) -> Numbers:
@@ -328,8 +327,7 @@ def _with_what_shows(
         fitted = with_values(structure, np.asarray(learned.estimator.values(learned.z)))
         values = dict(zip(unknown_names(learned.estimator), learned.z.tolist(), strict=True))
         gone.append(path)
-        data = without_time(structure.start.data, path)
-        structure = build_structure(finger_from_data(data, fitted.path), choice)
+        structure = build_structure(fitted.with_data(without_time(structure.start.data, path)), choice)
         learned = learn_batch(structure, recordings, watch, replace(settings, near=True), values)
     return structure, learned, gone
 

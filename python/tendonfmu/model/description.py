@@ -19,7 +19,7 @@ from typing import Any
 from tendonfmu.errors import InputError
 from tendonfmu.files import counted, path_of, write_text
 from tendonfmu.model import native
-from tendonfmu.model.description_numbers import extension_numbers, extension_rows, with_values_at
+from tendonfmu.model.description_numbers import extension_numbers, extension_rows, with_values_at, without_detection
 from tendonfmu.model.routing_geometry import finger_html
 
 IN_MEMORY = Path("finger")  # stands for the file of a finger that was read from none
@@ -62,10 +62,13 @@ class Finger:
     @cached_property
     def image(self) -> bytes:
         """The model image made from the description."""
-        try:
+        with native.refusals_of(self.path):
             return native.image_from_json(self.text)
-        except native.NativeError as refused:
-            raise InputError(f"{self.path}: {refused}") from None
+
+    @cached_property
+    def model(self) -> Finger:
+        """The friction model alone: the finger without its detector, and without how well its numbers are known."""
+        return self.with_data(without_detection(self.data))
 
     def __repr__(self) -> str:
         return f"<Finger {self.name}: {counted(self.joints, 'joint')}, {counted(self.tendons, 'tendon')}>"
@@ -140,7 +143,11 @@ class Finger:
             data = with_values_at(self.to_dict(), _plain(named), native.Instance(self.image))
         except InputError as refused:
             raise InputError(f"{self.path}: {refused}") from None
-        return finger_from_data(data, self.path)
+        return self.with_data(data)
+
+    def with_data(self, data: Mapping[str, Any]) -> Finger:
+        """Return the finger with another description, checked by the core; itself if it is the same."""
+        return self if data is self.data or data == self.data else finger_from_data(data, self.path)
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write the description as a JSON file, whole or not at all.
@@ -260,10 +267,8 @@ def finger_from_data(data: Mapping[str, Any], path: Path = IN_MEMORY) -> Finger:
 def finger_from_text(path: Path, text: bytes) -> Finger:
     """Read the text of a finger description."""
     _check_format(path, text)
-    try:
+    with native.refusals_of(path):
         image = native.image_from_json(text)
-    except native.NativeError as refused:
-        raise InputError(f"{path}: {refused}") from None
     finger = Finger(path, json.loads(text))
     vars(finger).update(text=text, image=image)  # `replace` makes a finger without them
     return finger

@@ -33,6 +33,8 @@ class EffectNumber:
 DEFAULTS: Mapping[str, float] = _TABLE["defaults"]  # by path
 RANGES: Mapping[str, tuple[float, float]] = {path: (least, most) for path, (least, most) in _TABLE["ranges"].items()}
 LIMITS: Mapping[str, int] = _TABLE["limits"]  # largest number of each in one description
+NEVER = 1e9  # N·m; no contact threshold is ever passed
+DETECTING = ("contact", "sensor_fault", "estimated")  # what is no part of the friction model
 # By effect, in the order of the FMU's parameters.
 EFFECT_NUMBERS: Mapping[str, Mapping[str, EffectNumber]] = {
     effect: {key: EffectNumber(**number) for key, number in numbers.items()}
@@ -95,6 +97,33 @@ def number_of(data: Mapping[str, Any], path: str) -> float:
     for key in path.split("."):
         node = (node or {}).get(key)
     return DEFAULTS[path] if node is None else float(node)
+
+
+def own_copy(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Copy a description so that no two laws are the same object, as in JSON data built by a program."""
+    copied: dict[str, Any] = json.loads(json.dumps(data))
+    return copied
+
+
+def get_number(data: Any, path: str) -> Any:
+    """Return a number, or another part, of a parsed description."""
+    for step in steps_of(path):
+        data = data[step]
+    return data
+
+
+def set_number(data: Any, path: str, value: float) -> None:
+    """Set a number of a parsed description in place."""
+    *way, last = steps_of(path)
+    for step in way:
+        data = data[step]
+    data[last] = value
+
+
+def without_detection(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the description of the friction model alone: nothing is detected, and nothing says what was estimated."""
+    kept = {key: value for key, value in data.items() if key not in DETECTING}
+    return {**kept, "contact": {"threshold": [NEVER] * len(data["joints"])}}
 
 
 # --- paths ------------------------------------------------------------------------------------------------------------

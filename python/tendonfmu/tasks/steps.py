@@ -11,9 +11,12 @@ import json
 import shutil
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tendonfmu.files import write_text
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 FOLDER = ".steps"
 FORMAT = "tendonfmu-calibration-step-1"
@@ -70,10 +73,9 @@ def digest_of(content: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
-def digest_of_file(file: Path) -> str:
-    """Return the digest of a file."""
+def digest_of_arrays(arrays: Mapping[str, NDArray[Any]]) -> str:
+    """Return the digest of named arrays."""
     digest = hashlib.sha256()
-    with file.open("rb") as opened:
-        while piece := opened.read(1 << 20):
-            digest.update(piece)
+    for name, values in arrays.items():
+        digest.update(f"{name}{values.shape}".encode() + values.tobytes())
     return digest.hexdigest()
