@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from .counting import GRACE, DetectionScore, Event, pooled, sample_seconds, score_detection, stretches
     from .free_motion import SETTLING, free_parts, require_no_contact
     from .noise import pretension_of
-    from .scoring import Scored, Subject, Track, run_track, score_recordings
+    from .scoring import Scored, Track, run_track, score_recordings
     from .summary import RocPoint, Summary
     from .tuning import ContactTuning, NotEnough, TuneWarning
 

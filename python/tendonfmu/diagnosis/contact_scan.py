@@ -28,7 +28,6 @@ from tendonfmu.detect import (
     SETTLING,
     ContactTuning,
     DetectionScore,
-    Subject,
     TuneWarning,
     free_parts,
     pooled,
@@ -400,8 +399,8 @@ def _tuned(data: Data, free: Sequence[Recording], kinematics: int, rate: float) 
 
 
 def _score(data: Data, recordings: Sequence[Recording], kinematics: int) -> DetectionScore:
-    subject = Subject(Path("finger"), finger_from_data(data), packed=False)
-    return pooled([run_track(subject, recording, kinematics, None).score() for recording in recordings])
+    finger = finger_from_data(data)
+    return pooled([run_track(finger, recording, kinematics).score() for recording in recordings])
 
 
 def _median(score: DetectionScore) -> float | None:
