@@ -48,11 +48,7 @@ def convert(log: str | os.PathLike[str], map: Mapping[str, Any] | str | os.PathL
     InputError
         The log or the map does not allow it.
     """
-    with tempfile.TemporaryDirectory() as scratch:
-        file = files.StandIn.of(Path(scratch) / "map.json", "map") if isinstance(map, Mapping) else Path(map)
-        if isinstance(map, Mapping):
-            file.write_text(json.dumps(map), encoding="utf-8")
-        columns = recorded.convert_table(Path(log), file).columns
+    columns = recorded.convert_table(Path(log), map if isinstance(map, Mapping) else Path(map)).columns
     return recorded.Recording.from_frame(files.frame_of(columns), name=str(log))
 
 

@@ -156,10 +156,8 @@ class Runner:
     def _take_converted(self, time: float, given: tuple[ArrayLike | None, ...]) -> None:
         """Take a sample of anything that numpy makes arrays of."""
         arrays = [_row(name, values) for name, values in zip(_INPUTS, given, strict=True)]
-        try:
+        with native.refusals_of(f"sample at {time!r} s"):
             self._take(_number(time), *arrays)
-        except native.NativeError as refused:
-            raise InputError(f"sample at {time!r} s: {refused}") from None
 
     def reset(self) -> None:
         """Forget all samples."""

@@ -168,10 +168,8 @@ def read_parameter_set(path: Path, finger: Finger) -> dict[str, float]:
         values[name] = value
     if not values:
         raise InputError(f"{path}: no parameters; expected at least one")
-    try:
+    with native.refusals_of(path):
         native.Instance(finger.image).set(values)
-    except native.NativeError as refused:
-        raise InputError(f"{path}: {refused}") from None
     return values
 
 

@@ -31,7 +31,7 @@ from tendonfmu.mjcf.finger_parts import (
     sampled_angles,
     stiffness_of,
 )
-from tendonfmu.model import NativeError, native
+from tendonfmu.model import native
 
 FORMAT = "tendonfmu-finger-1"
 UNLIMITED = 1.0  # rad (m); range on both sides of the reference of a joint without limits
@@ -334,10 +334,8 @@ def _weight(
 
 
 def _check_accepted(model: CompiledModel, data: Mapping[str, Any]) -> None:
-    try:
+    with native.refusals_of(f"{model.path}: these joints and tendons do not make a valid finger"):
         native.image_from_json(json.dumps(data))
-    except NativeError as refused:
-        raise InputError(f"{model.path}: these joints and tendons do not make a valid finger: {refused}") from None
 
 
 # --- what a description does not have ---------------------------------------------------------------------------------

@@ -134,6 +134,17 @@ def read_rig(path: Path) -> Rig:
         raise InputError(f"{path}: {refused}") from None
 
 
+def finger_with_limits(path: Path) -> tuple[Finger, Joints]:
+    """Return the finger of a rig, and the limits of its joints, whatever else the rig has. Raises InputError."""
+    files: list[Path] = []
+    root = Node(_with_base(path, files, []))
+    try:
+        finger = _finger(root.member("finger"), path, files)
+        return finger, _links(root.member("physics"), finger.joints)[1]
+    except Refusal as refused:
+        raise InputError(f"{path}: {refused}") from None
+
+
 # --- base -------------------------------------------------------------------------------------------------------------
 
 
