@@ -29,7 +29,6 @@ from tendonfmu.estimate import (
     unknowns,
     with_learned_numbers,
     with_previous_values,
-    with_values,
 )
 from tendonfmu.files import read_json
 from tendonfmu.model import Finger, read_finger
@@ -61,8 +60,7 @@ def fit_all(finger: Finger, recordings: Sequence[FitRecording], *, threads: int,
     structure = build_structure(finger, Choice(fix=torque_scales(finger.data)))
     settings = replace(settings_of(finger.data, kept, threads), near=True)
     learned = learn_batch(structure, kept, Watch(None), settings)
-    result = with_values(structure, np.asarray(learned.estimator.values(learned.z)))
-    result = with_learned_numbers(structure, learned, result)
+    result = with_learned_numbers(structure, learned, learned.fitted(structure))
     return CalibratedFit(result, events, tuple(learned.warnings))
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tendonfmu import drawing, estimate, files, fmu, model
+from tendonfmu import drawing, estimate, files, fmu
 from tendonfmu import report as reporting
 from tendonfmu.commands.command import FingerFile, FreeRecordings, Progress, Report, command, output_option
 from tendonfmu.commands.console import INTERRUPTED, Bar, deliver, fail, say, say_files
@@ -118,13 +118,12 @@ class FitResult(Result):
 
     def _set_parameters(self) -> list[SetParameter]:
         """Return the estimated numbers, and static friction that is equal to an estimated Coulomb friction."""
-        finger = model.native.Instance(self.finger.image)
-        known = {parameter.path for parameter in finger.parameters()}
+        known = self.finger.numbers
         return [
-            fmu.SetParameter(path, finger.get(path), fitted.standard_error, fitted.identified)
+            fmu.SetParameter(path, known[path].start, fitted.standard_error, fitted.identified)
             for fitted in self.estimator.numbers_
             for path in (fitted.number.path, fitted.number.with_path)
-            if path in known
+            if path is not None and path in known
         ]
 
     def plot(self) -> Any:

@@ -258,8 +258,7 @@ def _run(
 
 def scaled_bounds(finger: Finger, factor: float) -> dict[str, float]:
     """Return every bound that decides on contact, by path, times a factor."""
-    numbers = native.Instance(finger.image).parameters()
-    return {each.path: factor * each.start for each in numbers if each.path.startswith(BOUNDS)}
+    return {path: factor * each.start for path, each in finger.numbers.items() if path.startswith(BOUNDS)}
 
 
 def _score_scaled(finger: Finger, tracks: Sequence[Track], kinematics: int, factor: float) -> DetectionScore:

@@ -17,7 +17,7 @@ from tendonfmu.estimate.files import FIT_REPORT
 from tendonfmu.estimate.learning import Learned, unknown_names
 from tendonfmu.estimate.verdicts import CAUSES, Fitted
 from tendonfmu.files import counted, finite
-from tendonfmu.model import Effect, Finger, Instance, Law, native, without_friction
+from tendonfmu.model import Effect, Finger, Law, without_friction
 from tendonfmu.recordings import FitRecording, Model, consistency, rms, whiteness
 from tendonfmu.statistics import effective_samples
 
@@ -83,7 +83,6 @@ def build_report(
     memory: Mapping[str, Any] | None,  # how friction that remembers was fitted; None if there is none
 ) -> dict[str, Any]:
     """Build the report of a finished fit; numbers that are not finite become None."""
-    units = {parameter.path: parameter.unit for parameter in native.Instance(fitted.image).parameters()}
     report = {
         "format": FIT_REPORT,
         "finger": fitted.name,
@@ -97,7 +96,7 @@ def build_report(
         "options": dict(options),
         "warnings": list(warnings),
         "recordings": [evaluation.recording.entry() for evaluation in training],
-        "parameters": [_parameter(number, units) for number in numbers],
+        "parameters": [_parameter(number, fitted) for number in numbers],
         "correlation": {
             "paths": unknown_names(learned.estimator),
             "standard_errors": np.sqrt(np.maximum(np.diag(learned.covariance), 0.0)).tolist(),
@@ -117,10 +116,10 @@ def build_report(
     return {key: finite(value) for key, value in report.items()}
 
 
-def _parameter(number: Fitted, units: Mapping[str, str]) -> dict[str, Any]:
+def _parameter(number: Fitted, finger: Finger) -> dict[str, Any]:
     return {
         "path": number.number.path,
-        "unit": units[number.number.path],
+        "unit": finger.numbers[number.number.path].unit,
         "start": number.start,
         "value": number.value,
         "standard_error": number.standard_error,
@@ -346,8 +345,7 @@ class LawBands:
     """Curves of the laws of a fit, with their confidence bands."""
 
     def __init__(self, picture: FitPicture) -> None:
-        parameters = Instance(picture.fitted.image).parameters()
-        paths = [parameter.path for parameter in parameters]
+        paths = list(picture.fitted.numbers)
         self._covariance = np.asarray(picture.covariance)
         self._column = {
             (paths[k], unknown.role): column

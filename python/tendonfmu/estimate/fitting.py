@@ -218,10 +218,10 @@ class FrictionFit(Configured):
         return learned
 
     def _unfinished(self, stopped: Interrupted) -> Finger:
-        return with_values(self.structure_, np.asarray(stopped.estimator.values(stopped.z)))
+        return with_values(self.structure_, stopped.estimator.values(stopped.z))
 
     def _evaluated(self, learned: Learned) -> list[Evaluation]:
-        self.description_ = with_values(self.structure_, np.asarray(learned.estimator.values(learned.z)))
+        self.description_ = learned.fitted(self.structure_)
         start, fitted = self.start_.data, self.description_.data
         return [evaluate(start, fitted, recording) for recording in self.recordings_]
 

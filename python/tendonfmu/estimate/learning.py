@@ -11,7 +11,8 @@ from tendonfmu.arrays import Data, Flags, Numbers
 from tendonfmu.estimate.estimation import Estimator
 from tendonfmu.estimate.files import PreviousFit
 from tendonfmu.estimate.memory_fit import MemoryProblem, Minimum
-from tendonfmu.model import number_of
+from tendonfmu.estimate.structure import Structure, with_values
+from tendonfmu.model import Finger, number_of
 from tendonfmu.options import FitOptions, Number, option
 from tendonfmu.recordings import FitRecording
 
@@ -73,6 +74,10 @@ class Learned:
     innovations: list[Numbers] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)  # sentences
     memory: MemoryEvidence | None = None  # if friction remembers: then the estimator has no derivatives
+
+    def fitted(self, structure: Structure) -> Finger:
+        """Return the finger with the estimate."""
+        return with_values(structure, self.estimator.values(self.z))
 
 
 class Interrupted(Exception):

@@ -302,11 +302,11 @@ def learn_remembered(
     best = best_angles(structure.start.data, recordings)
     learn = partial(_with_what_shows, structure, choice, watch=watch, settings=settings)
     found, learned, gone = learn(best.recordings)
-    data = _fitted(found, learned)
+    data = learned.fitted(found).data
     source, left, delivered = best.source, left_without_bias(data, best.recordings), left_without_bias(data, recordings)
     if np.sum(delivered**2) > MUCH**2 * np.sum(left**2):
         others = learn(recordings)
-        again = left_without_bias(_fitted(*others[:2]), recordings)
+        again = left_without_bias(others[1].fitted(others[0]).data, recordings)
         if np.sum(again**2) < np.sum(delivered**2):
             found, learned, gone = others
             source, left, delivered = "the delivered source", again, again
@@ -324,10 +324,9 @@ def _with_what_shows(
     """Fit, and fit again without what the motion does not show."""
     learned, gone = learn_batch(structure, recordings, watch, settings), []
     while path := _not_shown(structure, learned):
-        fitted = with_values(structure, np.asarray(learned.estimator.values(learned.z)))
         values = dict(zip(unknown_names(learned.estimator), learned.z.tolist(), strict=True))
         gone.append(path)
-        structure = build_structure(fitted.with_data(without_time(structure.start.data, path)), choice)
+        structure = build_structure(structure.start.with_data(without_time(structure.start.data, path)), choice)
         learned = learn_batch(structure, recordings, watch, replace(settings, near=True), values)
     return structure, learned, gone
 
@@ -341,10 +340,6 @@ def _not_shown(structure: Structure, learned: Learned) -> str | None:
     costs = {path: problem.without(state, path) for path in paths}
     least = min(costs, key=costs.__getitem__, default=None)
     return least if least is not None and costs[least] < state.cost + SHOWN else None
-
-
-def _fitted(structure: Structure, learned: Learned) -> Data:
-    return with_values(structure, np.asarray(learned.estimator.values(learned.z))).data
 
 
 def left_without_bias(data: Data, recordings: Sequence[FitRecording]) -> Numbers:

@@ -25,7 +25,6 @@ from tendonfmu.model import (
     effects,
     get_number,
     law_path,
-    native,
     own_copy,
     set_number,
     sides,
@@ -90,9 +89,8 @@ def build_structure(finger: Finger, choice: Choice) -> Structure:
     owners = _owners(chosen, data, choice.share)
     data = _with_equal_values(data, chosen, owners)
     start = finger.with_data(data)
-    paths = [parameter.path for parameter in native.Instance(start.image).parameters()]
-    index = {path: k for k, path in enumerate(paths)}
-    group = np.full(len(paths), FIXED, dtype=np.int32)
+    index = {path: k for k, path in enumerate(start.numbers)}
+    group = np.full(len(index), FIXED, dtype=np.int32)
     for number, owner in zip(chosen, owners, strict=True):
         group[index[number.path]] = owner
         if number.with_path is not None:
@@ -102,7 +100,7 @@ def build_structure(finger: Finger, choice: Choice) -> Structure:
         beside={key: finger.data[key] for key in DETECTING if finger.data.get(key) is not None},
         numbers=_numbered(start, chosen),
         group=group,
-        scale=_scales(paths, chosen, choice.scale),
+        scale=_scales(index, chosen, choice.scale),
         index=index,
     )
 
@@ -234,8 +232,8 @@ def _chosen(numbers: list[Unknown], choice: Choice) -> list[Unknown]:
     return chosen
 
 
-def _scales(paths: list[str], chosen: Sequence[Unknown], given: Sequence[str]) -> NDArray[np.float64]:
-    scale = np.full(len(paths), np.nan)
+def _scales(index: Mapping[str, int], chosen: Sequence[Unknown], given: Sequence[str]) -> NDArray[np.float64]:
+    scale = np.full(len(index), np.nan)
     for text in given:
         pattern, _, number = text.rpartition("=")
         try:
@@ -245,9 +243,7 @@ def _scales(paths: list[str], chosen: Sequence[Unknown], given: Sequence[str]) -
         if not pattern or not 0 < value < np.inf:
             raise InputError(f"--scale {text}: expected PATTERN=VALUE with a value above 0, in the description's unit")
         hits = _select(chosen, [pattern], "--scale")
-        for k, path in enumerate(paths):
-            if path in hits:
-                scale[k] = value
+        scale[[index[path] for path in hits]] = value
     return scale
 
 

@@ -66,6 +66,11 @@ class Finger:
             return native.image_from_json(self.text)
 
     @cached_property
+    def numbers(self) -> Mapping[str, native.Parameter]:
+        """All numbers of the finger by path, in the order of the FMU's parameters, with unit and range."""
+        return {each.path: each for each in native.Instance(self.image).parameters()}
+
+    @cached_property
     def model(self) -> Finger:
         """The friction model alone: the finger without its detector, and without how well its numbers are known."""
         return self.with_data(without_detection(self.data))
@@ -140,7 +145,7 @@ class Finger:
         """
         try:
             named = {self.numbered(path) if isinstance(path, str) else path: value for path, value in values.items()}
-            data = with_values_at(self.to_dict(), _plain(named), native.Instance(self.image))
+            data = with_values_at(self.to_dict(), _plain(named), self.numbers)
         except InputError as refused:
             raise InputError(f"{self.path}: {refused}") from None
         return self.with_data(data)
@@ -397,7 +402,6 @@ def count(description: Finger) -> Counts:
     """Count what a description holds."""
     data = description.data
     present = list(laws(data))
-    parameters = native.Instance(description.image).parameters()
     edges = _entries(data, "edge_friction")
     kinds = ("friction", "load_friction", "pulley_friction", "edge_friction")
     return Counts(
@@ -414,8 +418,8 @@ def count(description: Finger) -> Counts:
         asymmetric_laws=sum(1 for _, law in present if len(sides(law)) == 2),
         covers=sum(1 for joint in data["joints"] if joint.get("cover") is not None),
         extensions=[row["effect"] for row in extension_rows(data)],
-        parameters=len(parameters),
-        tunable_parameters=sum(1 for parameter in parameters if parameter.tunable),
+        parameters=len(description.numbers),
+        tunable_parameters=sum(1 for number in description.numbers.values() if number.tunable),
         estimated_numbers=estimated_numbers(data),
     )
 

@@ -1,7 +1,7 @@
 """How the steps of a long computation are kept in a folder, so that finished and unchanged steps are not repeated.
 
-A result is JSON and belongs to everything it was made from: the digest of the files, of the options, of the results
-before it, and of the version of the product.
+A result is JSON and belongs to everything it was made from: the digest of the recordings, of the options, of the
+results before it, and of the version of the product.
 """
 
 from __future__ import annotations
