@@ -93,7 +93,7 @@ def main() -> None:
                 count = len(fit.report_["parameters"])
                 print(f"| {bias} | {name} | {sides} | {count} | " + " | ".join(cells) + " |", flush=True)
                 fitted = folder / f"fitted_{bias.split()[-1]}_{name}_{sides}.json"
-                fitted.write_text(fit.description_text(), encoding="utf-8")
+                fit.description_.write(fitted)
 
 
 if __name__ == "__main__":

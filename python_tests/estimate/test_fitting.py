@@ -78,7 +78,7 @@ def test_standard_errors_follow_from_the_unknowns(fit: FrictionFit) -> None:
 
 
 def test_the_fitted_description_is_one_and_keeps_all_else(fit: FrictionFit) -> None:
-    text = fit.description_text()
+    text = fit.description_.text
     native.image_from_json(text)
     fitted, start = json.loads(text), json.loads(json.dumps(moved_start()))
     for path, value in fit.parameters_.items():
@@ -378,7 +378,7 @@ def test_parameters_are_read_and_set_as_in_scikit_learn() -> None:
     assert (again.options.prior, again.options.share) == (3.0, ["tendons"])
     with pytest.raises(ValueError, match="no parameter 'colour'"):
         again.set_params(colour=1)
-    for not_fitted in (lambda: again.predict(made_recording()), again.description_text):
+    for not_fitted in (lambda: again.predict(made_recording()), again.picture):
         with pytest.raises(InputError, match="not fitted yet"):
             not_fitted()
 

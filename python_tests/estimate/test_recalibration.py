@@ -114,7 +114,7 @@ def previous(tmp_path_factory: pytest.TempPathFactory) -> tuple[FrictionFit, Pat
     found = fitted(moved_start(), made_recording(duration=20.0), tolerance=1e-3, prior=1.0)
     report, description = folder / "report.json", folder / "finger.json"
     report.write_text(report_text(found.report_), encoding="utf-8")
-    description.write_text(found.description_text(), encoding="utf-8")
+    found.description_.write(description)
     return found, report, description
 
 

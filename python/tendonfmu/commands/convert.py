@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tendonfmu import files
+from tendonfmu import files, model
 from tendonfmu import recordings as recorded
 from tendonfmu.commands import console
 from tendonfmu.commands.command import command
@@ -254,7 +254,7 @@ def _write_in_blocks(conversion: Conversion, output: Path) -> tuple[int, float]:
 
 def _convert_with_finger(file: Path, output: Path, map_file: Path, finger: Path) -> dict[str, Any]:
     log = recorded.convert_table(file, map_file)
-    description = recorded.description_text(recorded.describe_joint(log))
+    description = model.description_text(recorded.describe_joint(log))
     console.write_table(output, log.columns)
     files.write_text(finger, description)
     time = log.columns["time"]

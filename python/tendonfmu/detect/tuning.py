@@ -46,7 +46,7 @@ from tendonfmu.detect.sensor_faults import SensorRule, learn_sensors
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import check_given_once
 from tendonfmu.files import are, counted
-from tendonfmu.model import Finger, description_text, read_finger
+from tendonfmu.model import Finger, read_finger
 from tendonfmu.options import Configured, Options, TuneOptions
 from tendonfmu.recordings import RecordingSource, admit, listed_sources, read_recordings
 
@@ -353,10 +353,6 @@ class ContactTuning(Configured):
             self.warnings_.append(
                 f"compensated_torque_std is too large at {', '.join(wide)}: that of the bias exceeds the residuals"
             )
-
-    def description_text(self) -> str:
-        """Return the tuned description as JSON, as `tendonfmu tune -o` writes it."""
-        return description_text(self.description_.data)
 
 
 # --- what is left out together ----------------------------------------------------------------------------------------

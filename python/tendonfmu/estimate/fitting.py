@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from time import perf_counter
@@ -40,7 +40,7 @@ from tendonfmu.estimate.memory_choice import Remembered, learn_remembered
 from tendonfmu.estimate.methods import learn_batch, learn_ekf
 from tendonfmu.estimate.structure import Choice, build_structure, torque_scales, with_values
 from tendonfmu.estimate.verdicts import Fitted, judge_numbers, sizes_of
-from tendonfmu.model import Finger, FingerSource, description_text, number_of, read_finger
+from tendonfmu.model import Finger, number_of, read_finger
 from tendonfmu.options import Configured, FitOptions, Options
 from tendonfmu.recordings import (
     FitRecording,
@@ -78,10 +78,6 @@ class FrictionFit(Configured):
     ----------
     finger
         Description: its file, parsed JSON, or the result of `read_finger`. Effects that are absent stay absent.
-    method
-        "batch", maximum likelihood; or "ekf", the extended Kalman filter of the paper.
-    progress
-        Called with each `FitProgress`; returns False to stop.
     **options
         The options of `tendonfmu.fit`, with the same names and defaults, and `threads` (0: all cores).
 
@@ -101,16 +97,6 @@ class FrictionFit(Configured):
 
     Options: ClassVar[type[Options]] = FrictionFitOptions
     options: FrictionFitOptions
-
-    def __init__(
-        self,
-        finger: FingerSource,
-        method: str = "batch",
-        *,
-        progress: Callable[[Any], bool | None] | None = None,
-        **options: Any,
-    ) -> None:
-        super().__init__(finger, progress=progress, method=method, **options)
 
     # --- fit ----------------------------------------------------------------------------------------------------------
 
@@ -199,7 +185,6 @@ class FrictionFit(Configured):
         settings = replace(
             settings_of(self.start_.data, self.recordings_, passes=options.passes or passes),
             options=options,
-            effective=options.effective_samples,
             previous=previous,
         )
         self.remembered_: Remembered | None = None
@@ -316,11 +301,6 @@ class FrictionFit(Configured):
                 *(_series(evaluation, "comparison") for evaluation in self.comparisons_),
             ],
         )
-
-    def description_text(self) -> str:
-        """Return the fitted description as JSON, as `tendonfmu fit -o` writes it."""
-        self._require_fitted()
-        return description_text(self.description_.data)
 
 
 def _with_routing(given: Finger, sources: Sequence[RecordingSource]) -> tuple[Finger, dict[str, Any]]:

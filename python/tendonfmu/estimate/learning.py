@@ -30,7 +30,6 @@ class Settings:
 
     options: FrictionFitOptions
     passes: int  # most passes over the data
-    effective: bool = True  # whether samples count for their share of an effective number
     previous: PreviousFit | None = None  # previous fit that the start of the structure comes from, or None
     noise: float = 0.0  # torque noise of the description (N·m)
     torque: float = 0.0  # rms of the torque to explain (N·m)

@@ -119,7 +119,7 @@ def learn_batch(
     result = _fitted(estimator, begin, covariance, settings, watch, "")
     steps, passes = result.steps, result.passes
     weights = [np.ones_like(recording.target) for recording in recordings]
-    if settings.effective:
+    if settings.options.effective_samples:
         weights = _measured_weights(estimator, result.z, recordings, added, settings)
     is_coloured = any((each < 1).any() for each in weights)
     if is_coloured:
@@ -226,7 +226,7 @@ def learn_ekf(structure: Structure, recordings: Sequence[FitRecording], watch: W
     plain = np.diag(1 / (begun * np.array([unknown.scale for unknown in learner.unknowns])) ** 2)
     information = np.asarray(np.linalg.inv(covariance) - plain, dtype=np.float64)
     weights = [np.ones_like(recording.target) for recording in recordings]
-    if settings.effective and settings.options.drift == 0:
+    if settings.options.effective_samples and settings.options.drift == 0:
         weights = _common_weight(estimator, z, recordings, settings)
     share = float(weights[0][0, 0])
     if share < 1 or settings.previous is not None or (given is None and settings.options.drift == 0):

@@ -67,11 +67,6 @@ class ImportedFinger:
     warnings: list[str]  # what the description has less exactly than the model, with figures
     left_out: list[str]  # what of these joints and tendons the description does not have
 
-    @property
-    def text(self) -> str:
-        """The description as JSON."""
-        return json.dumps(self.data, indent=2, ensure_ascii=False) + "\n"
-
     def report(self, model: Path, output: Path) -> dict[str, Any]:
         """Return what was done, for `--json`. output: the file of the description."""
         return {
