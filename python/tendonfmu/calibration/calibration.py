@@ -157,6 +157,16 @@ class _Case:
         }
 
 
+def _refuse_twice(recordings: Sequence[Recording]) -> None:
+    """Refuse samples that are given twice, as if they were two measurements."""
+    seen: dict[str, Path] = {}
+    for recording in recordings:
+        _, digest = _digest(recording)
+        if digest in seen:
+            raise InputError(f"{recording.path}: given twice, as {seen[digest]}; expected each recording once")
+        seen[digest] = recording.path
+
+
 def _digest(recording: Recording) -> tuple[str, str]:
     return recording.path.name, digest_of_arrays(recording.arrays())
 
@@ -185,6 +195,8 @@ def _read(source: FingerSource, recordings: Sequence[list[RecordingSource]], opt
     check_given_once(given_free, tests, "a test")
     check_given_once(given_free, pushes, "one with pushes")
     read, others, touched = map(read_recordings, recordings)
+    _refuse_twice(read)
+    check_unseen(read, touched, "one with pushes")
     for recording in (*read, *others, *touched):
         recording.require(finger.joints, finger.tendons, ())
     for recording in (*read, *others):
