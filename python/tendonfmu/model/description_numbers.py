@@ -123,8 +123,9 @@ def set_number(data: Any, path: str, value: float) -> None:
 
 def without_detection(data: Mapping[str, Any]) -> dict[str, Any]:
     """Return the description of the friction model alone: nothing is detected, and nothing says what was estimated."""
-    kept = {key: value for key, value in data.items() if key not in DETECTING}
-    return {**kept, "contact": {"threshold": [NEVER] * len(data["joints"])}}
+    nothing = {"threshold": [NEVER] * len(data["joints"])}  # in the place of what is given: keys keep their order
+    kept = {key: value for key, value in data.items() if key == "contact" or key not in DETECTING}
+    return {**kept, "contact": nothing}
 
 
 # --- paths ------------------------------------------------------------------------------------------------------------
