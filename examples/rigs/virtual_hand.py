@@ -80,7 +80,7 @@ def main() -> None:
     for bias, finger in (("of the finger", given), ("of the paper", with_paper_bias(given))):
         for name, recording in training.items():
             for sides in ("symmetric", "asymmetric") if name == "varied" else ("symmetric",):
-                fit = FrictionFit(finger, sides=sides).fit(recording, compare=list(fresh.values()))
+                fit = FrictionFit(finger, asymmetric=sides == "asymmetric").fit(recording, compare=list(fresh.values()))
                 parts = fit.report_["residual"]["comparisons"]
                 if name == "constant":
                     for row, key in (("bias alone", "bias_only_rms"), ("the rig's own static numbers", "start_rms")):
@@ -93,7 +93,7 @@ def main() -> None:
                 count = len(fit.report_["parameters"])
                 print(f"| {bias} | {name} | {sides} | {count} | " + " | ".join(cells) + " |", flush=True)
                 fitted = folder / f"fitted_{bias.split()[-1]}_{name}_{sides}.json"
-                fitted.write_text(fit.description_text(), encoding="utf-8")
+                fit.description_.write(fitted)
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ import math
 import operator
 import os
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, fields
 from enum import IntEnum
 from numbers import Integral, Real
@@ -264,7 +264,6 @@ class Configured:
     """Base of an estimator as in scikit-learn, which keeps its finger and its options."""
 
     Options: ClassVar[type[Options]]
-    EARLIER: ClassVar[Mapping[str, str]] = {}  # names of earlier versions -> options
 
     def __init__(self, finger: Any, **options: Any) -> None:
         unknown = set(options) - set(self.Options.each())
@@ -275,7 +274,6 @@ class Configured:
     def __getattr__(self, name: str) -> Any:
         """Return an option, as scikit-learn's estimators have them."""
         options = self.__dict__.get("options")
-        name = self.EARLIER.get(name, name)
         if options is None or name not in options.each():
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
         return getattr(options, name)
@@ -441,7 +439,6 @@ class FitOptions(Options):
     )
     tolerance: float = option(0.3, Number(1e-9, 0.5), "batch: last step, in standard errors", metavar="SIZE")
     drift: float = option(0.0, Number(0.0, 1.0), "ekf: relative variance of the numbers per s", metavar="RATE")
-    resume: File | None = _path("continue an interrupted fit", metavar="FITTED.unfinished.json")
     progress: Callable[[Any], bool | None] | None = _progress("called with each `FitProgress`; returns False to stop")
 
     def __post_init__(self) -> None:

@@ -14,6 +14,7 @@ from pushed_finger import FINGER, FREE, UNSEEN, pushed
 from tendonfmu.calibration.calibration import Calibration, calibrate
 from tendonfmu.calibration.text import write_calibration
 from tendonfmu.files.tables import write_table
+from tendonfmu.options import CalibrateOptions
 from tendonfmu.recordings.recording import read_recording
 
 
@@ -35,7 +36,10 @@ def calibrated(folder: Path, demo_run: DemoRun) -> tuple[Calibration, Path]:
     out = folder / "out"
     shutil.copytree(demo_run.folder / "calibration", out)
     found = calibrate(
-        folder / FINGER, [folder / FREE], out, tests=[folder / UNSEEN], pushes=[folder / "pushes.parquet"]
+        folder / FINGER,
+        [folder / FREE],
+        out,
+        CalibrateOptions(test=[folder / UNSEEN], pushes=[folder / "pushes.parquet"]),
     )
     write_calibration(found, out)
     return found, out

@@ -14,14 +14,14 @@ import pytest
 from command import Call
 from pushed_finger import FINGER, FREE, UNSEEN, pushed
 from tendonfmu.calibration import calibration
-from tendonfmu.calibration.calibration import Calibration, Options, calibrate
+from tendonfmu.calibration.calibration import Calibration, calibrate
 from tendonfmu.calibration.fit import DIAGNOSED, JUDGED, fit_all, stretches_for_diagnosis
 from tendonfmu.calibration.text import verdict, write_calibration
 from tendonfmu.commands.calibrate import CalibrateResult
 from tendonfmu.errors import InputError
-from tendonfmu.estimate.structure import described
 from tendonfmu.files.tables import write_table
 from tendonfmu.model.description import read_finger
+from tendonfmu.options import CalibrateOptions
 from tendonfmu.recordings.prepared import Held, prepare
 from tendonfmu.recordings.recording import Recording, at_rows, read_recording
 from tendonfmu.report.numbers import rounded, together
@@ -42,10 +42,12 @@ def test_all_numbers_are_fitted_to_all_motion(calibrated: tuple[Calibration, Pat
     data["contact"] = {"threshold": data["contact"]["threshold"]}
     for joint in data["joints"]:
         joint["cover"]["stiffness"] *= 2.0
-    start = described(read_finger(calibrated[1] / "finger.json"), data)
+    start = read_finger(calibrated[1] / "finger.json").with_data(data)
     free = [prepare(start, read_recording(folder / FREE), 1, Held())]
     found = fit_all(start, free, threads=0, seed=0)
-    wrong, right = (float(np.nansum(free[0].run(each).residual[free[0].train] ** 2)) for each in (data, found.data))
+    wrong, right = (
+        float(np.nansum(free[0].run(each).residual[free[0].train] ** 2)) for each in (data, found.finger.data)
+    )
     assert right < 0.8 * wrong
 
 
@@ -75,7 +77,9 @@ def test_what_is_wrong_with_a_recording_is_said_once(
     columns = {f"{name}[{k + 1}]": each[rows] for name, group in whole.groups.items() for k, each in enumerate(group.T)}
     write_table(tmp_path / "gap.parquet", {"time": whole.time[rows], **columns})
     previous = calibrated[1] / "finger.json"  # so that nothing is diagnosed
-    found = calibrate(folder / FINGER, [tmp_path / "gap.parquet"], tmp_path / "out", previous=previous)
+    found = calibrate(
+        folder / FINGER, [tmp_path / "gap.parquet"], tmp_path / "out", CalibrateOptions(previous=previous)
+    )
     assert sum(" gap" in sentence for sentence in found.report["warnings"]) == 1, found.report["warnings"]
 
 
@@ -84,7 +88,7 @@ def test_the_folder_holds_finger_fmu_page_and_report(calibrated: tuple[Calibrati
 
     found, out = calibrated
     finger = read_finger(out / "finger.json")
-    assert finger.data == json.loads(json.dumps(found.data)) and "gravity" in (out / "finger.json").read_text()
+    assert finger.data == json.loads(json.dumps(found.finger.data)) and "gravity" in (out / "finger.json").read_text()
     report = json.loads((out / "calibration.json").read_text(encoding="utf-8"))
     assert report["format"] == "tendonfmu-calibration-1" and report["error"] == found.report["error"]
     page = (out / "calibration.html").read_text(encoding="utf-8")
@@ -115,7 +119,7 @@ def test_the_same_call_does_nothing_again(
     assert answer.status == 0 and answer.err == ""
     report = json.loads((out / "calibration.json").read_text(encoding="utf-8"))
     assert json.loads(answer.out) == report and report["steps"]["repeated"] == ["diagnosis", "fit", "tune", "score"]
-    assert json.loads((out / "finger.json").read_text()) == json.loads(json.dumps(found.data))
+    assert json.loads((out / "finger.json").read_text()) == json.loads(json.dumps(found.finger.data))
     with pytest.raises(AssertionError, match="done again"):
         calibrate(folder / FINGER, [folder / UNSEEN], out)
 
@@ -125,8 +129,8 @@ def test_another_wish_repeats_the_last_steps_alone(
     calibrated: tuple[Calibration, Path], folder: Path, tmp_path: Path
 ) -> None:
     shutil.copytree(calibrated[1], tmp_path / "out")
-    wish = Options(false_alarms_per_hour=360.0)
-    other = calibrate(folder / FINGER, [folder / FREE], tmp_path / "out", tests=[folder / UNSEEN], options=wish)
+    wish = CalibrateOptions(test=[folder / UNSEEN], false_alarms_per_hour=360.0)
+    other = calibrate(folder / FINGER, [folder / FREE], tmp_path / "out", wish)
     assert other.report["steps"]["repeated"] == ["diagnosis", "fit"] and other.report["pushes"] is None
 
 
@@ -147,20 +151,19 @@ def test_an_earlier_calibration_is_the_prior_of_little_data(
         folder / FINGER,
         [tmp_path / "short.parquet"],
         tmp_path / "again",
-        tests=[folder / UNSEEN],
-        previous=out / "finger.json",
+        CalibrateOptions(test=[folder / UNSEEN], previous=out / "finger.json"),
     )
     write_calibration(again, tmp_path / "again")
     error = again.report["error"]
     assert together(error["calibrated"]) <= 1.01 * together(error["previous"]) < 0.005
-    assert "gravity" in json.dumps(again.data["extensions"]) and again.report["structure"]["causes"] == []
+    assert "gravity" in json.dumps(again.finger.data["extensions"]) and again.report["structure"]["causes"] == []
     page = (tmp_path / "again" / "calibration.html").read_text(encoding="utf-8")
     assert "the earlier calibration" in page and "diagnosis.html" not in page
     other = json.loads((out / "finger.json").read_text())
     other["joints"][0]["name"] = "thumb"
     (tmp_path / "other.json").write_text(json.dumps(other))
     with pytest.raises(InputError, match=r"joints thumb.*expected joint_1"):
-        calibrate(folder / FINGER, [folder / FREE], tmp_path / "no", previous=tmp_path / "other.json")
+        calibrate(folder / FINGER, [folder / FREE], tmp_path / "no", CalibrateOptions(previous=tmp_path / "other.json"))
 
 
 def test_touched_motion_is_no_free_motion(folder: Path, tmp_path: Path) -> None:
@@ -176,7 +179,12 @@ def test_recordings_that_cannot_be_are_refused(
     free: list[str], tests: list[str], words: str, folder: Path, tmp_path: Path
 ) -> None:
     with pytest.raises(InputError, match=words):
-        calibrate(folder / FINGER, [folder / each for each in free], tmp_path, tests=[folder / each for each in tests])
+        calibrate(
+            folder / FINGER,
+            [folder / each for each in free],
+            tmp_path,
+            CalibrateOptions(test=[folder / each for each in tests]),
+        )
 
 
 # --- steps ------------------------------------------------------------------------------------------------------------

@@ -18,10 +18,11 @@ from tendonfmu.calibration import calibration
 from tendonfmu.calibration.calibration import Calibration, calibrate
 from tendonfmu.calibration.report import Delivered, Judged
 from tendonfmu.detect import stretches
-from tendonfmu.detect.scoring import scaled_detection
+from tendonfmu.detect.scoring import scaled_bounds
 from tendonfmu.files.tables import write_table
 from tendonfmu.model.description import read_finger
 from tendonfmu.model.native import Instance
+from tendonfmu.options import CalibrateOptions
 from tendonfmu.recordings import Held, prepare
 from tendonfmu.recordings.recording import read_recording
 
@@ -84,7 +85,7 @@ def test_no_held_out_sample_chooses_anything(
     replace(recording, groups={**recording.groups, "tendon_force": force}).write(tmp_path / "short.parquet")
     other = calibrate(folder / FINGER, [tmp_path / "short.parquet"], tmp_path / "out")
     found = alone[0]
-    assert other.data == found.data
+    assert other.finger == found.finger
     one, same = ({**each.report["detection"], "kept_out": None} for each in (found, other))
     assert one == same, "but for the files' names"
     assert other.report["structure"] == found.report["structure"] and other.report["next"] == found.report["next"]
@@ -100,9 +101,11 @@ def test_a_test_chooses_nothing(
     kept = {name: values for name, values in columns.items() if name.startswith(("time", "tendon"))}
     write_table(tmp_path / "loaded.parquet", kept)
     shutil.copytree(demo_run.folder / "calibration", tmp_path / "out")
-    other = calibrate(folder / FINGER, [folder / FREE], tmp_path / "out", tests=[tmp_path / "loaded.parquet"])
+    other = calibrate(
+        folder / FINGER, [folder / FREE], tmp_path / "out", CalibrateOptions(test=[tmp_path / "loaded.parquet"])
+    )
     assert other.report["steps"]["repeated"] == ["diagnosis", "fit", "tune"], "no step knows the test"
-    assert other.data == calibrated[0].data
+    assert other.finger == calibrated[0].finger
     assert min(other.report["error"]["calibrated"]) > 1.5 * max(calibrated[0].report["error"]["calibrated"])
 
 
@@ -112,10 +115,10 @@ def test_false_alarms_are_counted_on_the_same_motion(calibrated: tuple[Calibrati
     judged = Judged([prepare(finger, recording, 1, Held())], held_out=False)
     counts = []
     for factor in (1.0, 0.3):
-        data = scaled_detection(finger.data, factor)
-        contact = Instance.from_description(data).run(recording.arrays())["contact"].ravel()
+        scaled = finger.replace(scaled_bounds(finger, factor))
+        contact = Instance(scaled.image).run(recording.arrays())["contact"].ravel()
         counts.append(len(stretches(recording.time, contact)))
-        assert Delivered(data, judged).alarms()["alarms"] == counts[-1]
+        assert Delivered(scaled, judged).alarms()["alarms"] == counts[-1]
     assert calibrated[0].report["alarms"]["alarms"] == counts[0] < counts[1]
 
 

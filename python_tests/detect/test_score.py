@@ -14,10 +14,12 @@ import pytest
 from numpy.typing import NDArray
 
 from command import Answer, Call
+from fit_cases import small_finger
 from real_browser import Elements
 from repository_paths import ROOT
-from tendonfmu.detect.scoring import scaled_detection
+from tendonfmu.detect.scoring import scaled_bounds
 from tendonfmu.files.tables import read_table, write_table
+from tendonfmu.model import finger_from_data
 from tendonfmu.model.native import Instance
 from tendonfmu.recordings.recording import read_recording
 
@@ -171,13 +173,13 @@ def test_an_fmu_scores_the_same_without_a_roc(call: Call, pushes: Table) -> None
         close_to(packed[key], plain[key], key, tolerance=1e-3 if key.startswith(("free_rms", "recordings")) else 0.0)
 
 
-def test_scaled_detection_scales_all_that_decides() -> None:
+def test_scaled_bounds_are_all_that_decides() -> None:
     band = {"noise": [0.1, 0.2], "motor_load": [0.0, 3.0]}
-    data = {"contact": {"threshold": [0.1, 0.2], "method": "bands", "bands": [band] * 4, "deviation": [1.0, 1.0]}}
-    wider = {"noise": [0.2, 0.4], "motor_load": [0.0, 6.0]}
-    scaled = {"threshold": [0.2, 0.4], "method": "bands", "bands": [wider] * 4, "deviation": [1.0, 1.0]}
-    assert scaled_detection(data, 2.0)["contact"] == scaled
-    assert data["contact"]["threshold"] == [0.1, 0.2] and band["noise"] == [0.1, 0.2]
+    contact = {"threshold": [0.1, 0.2], "method": "bands", "bands": [band] * 4, "deviation": [1.0, 1.0]}
+    finger = finger_from_data({**small_finger(), "contact": contact})
+    scaled = finger.replace(scaled_bounds(finger, 2.0)).data["contact"]
+    assert scaled["threshold"] == [0.2, 0.4] and scaled["deviation"] == [1.0, 1.0]
+    assert all(each["noise"] == [0.2, 0.4] and each["motor_load"] == [0.0, 6.0] for each in scaled["bands"])
 
 
 # --- bad input --------------------------------------------------------------------------------------------------------

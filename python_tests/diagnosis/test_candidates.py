@@ -22,8 +22,7 @@ from tendonfmu.diagnosis.effects.mechanism import add_to_number
 from tendonfmu.diagnosis.extension_fit import number_columns
 from tendonfmu.diagnosis.samples import Samples, Span, span_of
 from tendonfmu.estimate import unknowns
-from tendonfmu.estimate.structure import own_copy
-from tendonfmu.model import native
+from tendonfmu.model import native, own_copy
 from tendonfmu.model.description import Finger
 from tendonfmu.model.friction_places import balanced_forces, moment_arms
 from tendonfmu.recordings.prepared import FitRecording, Held, prepare

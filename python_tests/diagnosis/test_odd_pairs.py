@@ -93,7 +93,7 @@ def test_a_pair_is_tuned_or_refused(name: str, method: str, tmp_path: Path) -> N
     if refused:
         assert re.search("expected |; probably ", refused) and "\n" not in refused and not CODE.search(refused)
         return
-    data = json.loads(tuning.description_text())
+    data = tuning.description_.to_dict()
     Instance.from_description(data, pair.kinematics)  # the core takes it
     contact = data["contact"]
     assert contact["method"] == method

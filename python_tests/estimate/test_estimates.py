@@ -16,8 +16,8 @@ from fit_finger import made_recording, moved_start
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import FrictionFit, known_numbers
 from tendonfmu.estimate.files import with_estimates
-from tendonfmu.estimate.structure import estimable_numbers, get_number, set_number
-from tendonfmu.model import native, read_finger
+from tendonfmu.estimate.structure import estimable_numbers
+from tendonfmu.model import get_number, native, read_finger, set_number
 from tendonfmu.recordings import Recording
 
 pytestmark = pytest.mark.filterwarnings("ignore::tendonfmu.estimate.fitting.FitWarning")
@@ -76,7 +76,7 @@ def fitted(finger: Any, *recordings: Recording) -> FrictionFit:
 def test_what_a_fit_wrote_is_known_to_the_next_one_until_somebody_changes_it() -> None:
     first = fitted(moved_start(), made_recording(duration=40.0))
     assert first.report_["given_numbers"]["start"] == "guessed"
-    finger = json.loads(first.description_text())
+    finger = first.description_.to_dict()
     again = fitted(finger, made_recording(seed=5, duration=3.0))
     paragraph = again.report_["given_numbers"]["paragraph"]
     assert again.report_["given_numbers"]["start"] == "estimated" and "were estimated before" in paragraph
@@ -85,7 +85,7 @@ def test_what_a_fit_wrote_is_known_to_the_next_one_until_somebody_changes_it() -
     assert len(kept) > 5 and all(not number.identified for number in again.numbers_ if number.number.path in kept)
     path = next(path for path in kept if path.endswith("viscous"))
     set_number(finger, path, 1.01 * get_number(finger, path))
-    assert set(known_numbers(json.loads(first.description_text()))) - set(known_numbers(finger)) == {path}
+    assert set(known_numbers(first.description_.to_dict())) - set(known_numbers(finger)) == {path}
 
 
 def at_pretension(force: float, seed: int = 1) -> Recording:

@@ -22,7 +22,7 @@ Change = Callable[[Recording], Recording | None]  # in place, or another recordi
 
 
 def fitted(recording: Recording | list[Recording], finger: dict[str, Any] | None = None, **options: Any) -> FrictionFit:
-    settings = {"share": ["tendons"], "kinematics": 3, "max_passes": 8} | options
+    settings = {"share": ["tendons"], "kinematics": 3, "passes": 8} | options
     return FrictionFit(finger or small_finger(), **settings).fit(recording)
 
 
@@ -135,10 +135,10 @@ def test_what_is_refused(change: Change, options: dict[str, Any], words: str) ->
 
 
 def test_a_good_recording_gets_no_warning() -> None:
-    fit = fitted(made_recording(), max_passes=60)
+    fit = fitted(made_recording(), passes=60)
     assert fit.warnings_ == [] and fit.converged_
     for kinematics in (1, 2):
-        assert not said(fitted(made_recording(), kinematics=kinematics, max_passes=1), "map of columns")
+        assert not said(fitted(made_recording(), kinematics=kinematics, passes=1), "map of columns")
     assert fitted(made_recording(), bias(noise_std=0.0, noise_std_per_force=3e-4)).finished_
 
 
@@ -146,7 +146,7 @@ def test_what_was_checked_is_neither_checked_nor_told_again() -> None:
     recording = made_recording()
     later(recording, (2200, 5.0))
     recording.groups["joint_position"][:] *= 180 / np.pi
-    fit = FrictionFit(small_finger(), share=["tendons"], kinematics=1, max_passes=1).fit(recording, checked=True)
+    fit = FrictionFit(small_finger(), share=["tendons"], kinematics=1, passes=1).fit(recording, checked=True)
     assert not said(fit, "gap") and not said(fit, "map of columns")
 
 
@@ -217,7 +217,7 @@ def test_contact_is_trained_on_where_the_load_is_known() -> None:
 
 @pytest.mark.parametrize(("rate", "duration", "words"), [(10.0, 40.0, "poorly resolved"), (20000.0, 2.0, "decimating")])
 def test_rates_that_are_too_low_or_high_are_said(rate: float, duration: float, words: str) -> None:
-    fit = fitted(made_recording(rate=rate, duration=duration), max_passes=3)
+    fit = fitted(made_recording(rate=rate, duration=duration), passes=3)
     assert said(fit, f"{rate:.5g} samples per second", words)
     assert all(np.isfinite(list(fit.parameters_.values())))
 

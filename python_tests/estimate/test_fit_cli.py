@@ -14,10 +14,9 @@ import jsonschema
 import pytest
 
 from command import Answer, Call
-from fit_cases import small_finger
 from fit_finger import made_recording, moved_start, write_recording
 from repository_paths import ROOT
-from tendonfmu.estimate.structure import get_number
+from tendonfmu.model import get_number
 
 needs_proc = pytest.mark.skipif(
     not Path("/proc/self").is_dir(), reason="SKIPPED: no folder here that nobody may write into"
@@ -86,18 +85,12 @@ def test_a_fit_writes_a_parameter_set_that_an_fmu_carries(call: Call, files: tup
     ("arguments", "words"),
     [
         (("-o", "finger.json"), "finger.json: the same file as the input"),
-        (("-o", "left.json", "--resume", "left.json"), "left.json: the same file as the input left.json"),
         (("-o", "rec.json", "--report", "rec.json"), "expected two names"),
         (("-o", "f.csv"), "f.csv: expected a name that ends in .json"),
         (("-o", "f.json", "--ssv", "f.json"), "f.json: expected a name that ends in .ssv"),
         (("-o", "f.json", "--figures", "finger.json"), "finger.json: a file; expected a folder"),
         (("-o", "f.json", "--figures", "finger.json/figures"), "finger.json is a file; expected a folder"),
-        (("-o", "f.json", "--resume", "nothing.json"), "nothing.json"),
-        (
-            ("-o", "f.json", "--resume", "finger.json"),
-            'finger.json: format = "tendonfmu-finger-1"; expected "tendonfmu-fit',
-        ),
-        (("-o", "f.json", "--resume", "left.json"), "the interrupted fit has 1 unknowns, this fit has 70"),
+        (("-o", "f.json", "--from", "nothing.json"), "nothing.json"),
         (("./rec.parquet", "-o", "f.json"), "rec.parquet: given twice; expected each recording once"),
         (("-o", "f.json", "--compare", "rec.parquet"), "rec.parquet: compared with, but trained on as well"),
         pytest.param(("-o", "/proc/f.json"), "/proc/f.json: cannot be written", marks=needs_proc),
@@ -111,8 +104,6 @@ def test_a_fit_writes_a_parameter_set_that_an_fmu_carries(call: Call, files: tup
 def test_bad_usage_is_one_line_and_writes_nothing(
     call: Call, files: tuple[Path, Path], arguments: tuple[str, ...], words: str
 ) -> None:
-    left = {"format": "tendonfmu-fit-unfinished-1", "z": [1.0], "unknowns": ["x"], "description": small_finger()}
-    Path("left.json").write_text(json.dumps(left))
     before = {path: path.read_bytes() for path in Path().iterdir()}
     answer = call("fit", *files, *arguments)
     assert answer.status == 2 and words in answer.err and answer.err.count("\n") == 1, answer
@@ -127,7 +118,7 @@ def take_interrupts() -> None:
 @pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="SKIPPED: no SIGINT for another process")
 @pytest.mark.parametrize(("method", "phase"), [("batch", b"pass 2"), ("ekf", b"filtering, pass 1")])
-def test_ctrl_c_leaves_the_best_so_far_and_resume_goes_on(
+def test_ctrl_c_leaves_the_best_so_far_from_which_a_fit_goes_on(
     call: Call, tmp_path: Path, method: str, phase: bytes
 ) -> None:
     """The index finger with 468 numbers takes some seconds: time to interrupt it."""
@@ -152,9 +143,7 @@ def test_ctrl_c_leaves_the_best_so_far_and_resume_goes_on(
     assert run.returncode == 130
     assert "the best estimate so far is in fitted.unfinished.json" in rest.decode().splitlines()[-1]
     assert [path.name for path in tmp_path.iterdir()] == ["fitted.unfinished.json"]
-    left = json.loads((tmp_path / "fitted.unfinished.json").read_text())
-    assert len(left["z"]) == len(left["unknowns"]) == 468
-    assert "file of a fit; expected a finger description" in call("check", "fitted.unfinished.json").err
-    answer = call(*command, "--resume", "fitted.unfinished.json", "--passes", "1", "--holdout", "0.9")
+    command[1] = "fitted.unfinished.json"
+    answer = call(*command, "--passes", "1", "--holdout", "0.9")
     assert answer.status == 0
     assert call("check", "fitted.json").status == 0

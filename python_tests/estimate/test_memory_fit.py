@@ -17,8 +17,8 @@ from tendonfmu.errors import InputError
 from tendonfmu.estimate.fitting import FrictionFit
 from tendonfmu.estimate.learning import posterior_factor
 from tendonfmu.estimate.memory_choice import choose_memory
-from tendonfmu.estimate.structure import Choice, get_number
-from tendonfmu.model import finger_from_data, moment_arms
+from tendonfmu.estimate.structure import Choice
+from tendonfmu.model import finger_from_data, get_number, moment_arms
 from tendonfmu.recordings import FitRecording, Held, Recording, best_angles, prepare
 
 pytestmark = pytest.mark.filterwarnings("ignore::tendonfmu.estimate.fitting.FitWarning")

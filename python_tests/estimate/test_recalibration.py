@@ -71,7 +71,7 @@ def fitted_truth() -> dict[str, float]:
 def test_standard_errors_cover_the_truth(method: str) -> None:
     """rms of the scores: 1 where the standard errors are right. Every sample counted, it is far above."""
     recordings = [held_noise(seed, 20.0, 0.006) for seed in (1, 2, 4, 5, 6)]  # in 3 a tendon goes slack
-    passes = {"max_passes": 6} if method == "ekf" else {}  # as many as settle it
+    passes = {"passes": 6} if method == "ekf" else {}  # as many as settle it
     fits = {
         effective: [
             # with a wide prior: else numbers that are right stay where they are
@@ -114,7 +114,7 @@ def previous(tmp_path_factory: pytest.TempPathFactory) -> tuple[FrictionFit, Pat
     found = fitted(moved_start(), made_recording(duration=20.0), tolerance=1e-3, prior=1.0)
     report, description = folder / "report.json", folder / "finger.json"
     report.write_text(report_text(found.report_), encoding="utf-8")
-    description.write_text(found.description_text(), encoding="utf-8")
+    found.description_.write(description)
     return found, report, description
 
 

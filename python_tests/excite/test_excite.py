@@ -254,8 +254,8 @@ def test_ranges_come_from_working_points_and_from_a_rig(small_file: Path, tmp_pa
     with pytest.raises(InputError, match=r"--range tip=-2:0: beyond the joint.*-1 to 1 rad"):
         find_ranges(subject, ["tip=-2:0"])
     for finger, limits, words in (
-        (SMALL, [(0.4, -0.5)] * 2, r"links\[1\]\.limits: 0.4 to -0.5 rad"),
-        (SMALL, [(-0.4, 0.5)], "1 link; expected one per joint, 2"),
+        (SMALL, [(0.4, -0.5)] * 2, r"links\[1\]\.limits\.upper = -0.5: expected an angle above limits.lower, 0.4 rad"),
+        (SMALL, [(-0.4, 0.5)], "expected a list of 2, one link per joint of the finger"),
         ({}, [(-0.4, 0.5)], r"finger: .*format"),
     ):
         with pytest.raises(InputError, match=words):

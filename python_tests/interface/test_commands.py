@@ -121,7 +121,7 @@ def test_messages_name_what_was_given(frame: pd.DataFrame) -> None:
     for refused, words in {
         lambda: tf.calibrate(FINGER, frame.iloc[:300]): "DataFrame: no sample to measure the gain on",
         lambda: tf.calibrate(FINGER, [frame, frame]): "DataFrame 2: given twice, as DataFrame 1; expected each",
-        lambda: tf.calibrate(FINGER, frame, test=frame): "DataFrame: a test, but trained on as well, as DataFrame; ",
+        lambda: tf.calibrate(FINGER, frame, test=frame): "DataFrame: a test, but trained on as well: the same ",
         lambda: tf.calibrate(FINGER, few): "mine: 3 columns tendon_force[...], expected 4",
         lambda: tf.convert(TRAINING, {"format": "x"}): 'map: format = "x"',
         lambda: tf.calibrate(FINGER, tf.read_recording(TRAINING)[:0.5]): f"{TRAINING}: ",

@@ -131,8 +131,8 @@ def test_the_program_of_the_page_learns_what_the_command_does(prefix: Path, tmp_
     lines = [line.split() for line in call(tmp_path / "learn", tmp_path / "finger.json", recording).splitlines()]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        options = {"max_passes": 1, "effective_samples": False, "prior": 1.0}
-        fit = FrictionFit(tmp_path / "finger.json", "ekf", **options).fit(recording)
+        options = {"passes": 1, "effective_samples": False, "prior": 1.0}
+        fit = FrictionFit(tmp_path / "finger.json", method="ekf", **options).fit(recording)
     assert {path for path, *_ in lines} == set(fit.parameters_)
     for path, value, error in lines:
         assert float(value) == pytest.approx(fit.parameters_[path], rel=1e-8)

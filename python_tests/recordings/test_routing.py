@@ -12,9 +12,10 @@ import pytest
 
 from command import Call
 from repository_paths import ROOT
-from tendonfmu.calibration.calibration import Options, _read
+from tendonfmu.calibration.calibration import _read
 from tendonfmu.files import write_table
 from tendonfmu.model import Finger, finger_from_data, read_finger, tendon_positions
+from tendonfmu.options import CalibrateOptions
 from tendonfmu.recordings import Recording, belongs, learn_routing, read_recording, routed
 from tendonfmu.recordings.faults import tendon_angles
 
@@ -222,10 +223,10 @@ def test_a_calibration_begins_with_the_routing(tmp_path: Path, index: tuple[Fing
     given, free = tmp_path / "given.json", tmp_path / "free.parquet"
     given.write_text(json.dumps(dict(changed(index[0], arms=0.2, stiffness=0.5).data)), encoding="utf-8")
     index[1][:30.0].write(free)
-    case = _read(given, None, [[free], [], []], Options())
+    case = _read(given, [[free], [], []], CalibrateOptions())
     np.testing.assert_allclose(case.finger.moment_arms, index[0].moment_arms, rtol=0.01)
     assert case.routing is not None and len(case.routing["sentences"]) == 8
-    assert _read(INDEX, None, [[free], [], []], Options()).routing is None
+    assert _read(INDEX, [[free], [], []], CalibrateOptions()).routing is None
 
 
 def test_a_finger_is_described_by_names(tmp_path: Path, call: Call) -> None:

@@ -87,7 +87,7 @@ def recover(folder: Path, seed: int) -> list[Recovered]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FitWarning)  # sticking is no white noise: effective_samples counts it as less
         fitting.fit([folder / "free.parquet"])
-    (folder / "fitted.json").write_text(fitting.description_text(), encoding="utf-8")
+    fitting.description_.write(folder / "fitted.json")
     export_numbers(folder / "fitted.json", folder / "guess.xml", folder / "fitted.xml")
     fitted = mujoco.MjModel.from_xml_path(str(folder / "fitted.xml"))
     true = mujoco.MjModel.from_xml_string(machine())

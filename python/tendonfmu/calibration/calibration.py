@@ -10,12 +10,13 @@ Examples
 --------
 >>> from tendonfmu.calibration import calibrate
 >>> free = ["free_10N.parquet", "free_30N.parquet"]
->>> found = calibrate("finger.json", free, "calibrated", pushes=["pushes.parquet"])
->>> found.report["error"], found.report["detection"], found.data
+>>> found = calibrate("finger.json", free, "calibrated", CalibrateOptions(pushes=["pushes.parquet"]))
+>>> found.report["error"], found.report["detection"], found.finger
 """
 
 from __future__ import annotations
 
+import os
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -23,7 +24,6 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from tendonfmu.arrays import Data
 from tendonfmu.calibration.fit import CalibratedFit, earlier_finger, fit_again, fit_all, stretches_for_diagnosis
 from tendonfmu.calibration.report import (
     OF_PUSH,
@@ -44,28 +44,29 @@ from tendonfmu.detect import ContactTuning, TuneWarning, require_no_contact, sco
 from tendonfmu.detect import score_report as detect_score_report
 from tendonfmu.diagnosis import Diagnosis, diagnose
 from tendonfmu.errors import InputError
-from tendonfmu.estimate import check_given_once, check_unseen, described, unseen_square
-from tendonfmu.files import finite, path_of, percent, write_text
-from tendonfmu.model import Finger, description_text, read_finger
-from tendonfmu.options import CalibrateOptions, ScoreOptions
+from tendonfmu.estimate import check_given_once, check_unseen, unseen_square
+from tendonfmu.files import finite, path_of, percent, read_json
+from tendonfmu.model import Finger, FingerSource, finger_from_data, read_finger
+from tendonfmu.options import CalibrateOptions, RecordingSources, ScoreOptions
 from tendonfmu.recordings import (
     UNFIT_FOR_SEARCH,
     FitRecording,
     Held,
     Recording,
+    RecordingSource,
     RoutingEntry,
     admit,
     learn_routing,
+    listed_sources,
     prepare,
-    read_recording,
+    read_recordings,
     require_noise,
     routed,
     routing_entry,
 )
 from tendonfmu.report import MotionShown, PushShown, diagnosis_page, write_diagnosis
-from tendonfmu.tasks import FOLDER, Phases, PhaseState, Steps, digest_of, digest_of_file
+from tendonfmu.tasks import Phases, PhaseState, Steps, digest_of, digest_of_arrays
 
-Options = CalibrateOptions  # its name in earlier versions
 USUAL = CalibrateOptions()
 FORMAT = "tendonfmu-calibration-1"
 DIAGNOSIS = "diagnosis"  # folder of the full diagnosis
@@ -94,7 +95,7 @@ PHASES = {
 class Calibration:
     """A finished calibration."""
 
-    data: Data  # the calibrated description
+    finger: Finger  # calibrated
     report: dict[str, Any]  # `calibration.json`, without the list of files
     # the diagnosis; None if this call did not make it, because it was resumed or not asked for
     diagnosis: Diagnosis | None
@@ -104,31 +105,23 @@ class Calibration:
 
 
 def calibrate(
-    finger: Path | str,
-    free: Sequence[Path | str],
-    folder: Path | str,
-    *,
-    tests: Sequence[Path | str] = (),
-    pushes: Sequence[Path | str] = (),
-    previous: Path | str | None = None,
+    finger: FingerSource,
+    free: RecordingSources,
+    folder: Path | str | os.PathLike[str],
     options: CalibrateOptions = USUAL,
-    progress: Callable[[PhaseState], None] | None = None,
 ) -> Calibration:
     """Calibrate a finger on free motion; results of the steps and the page of the diagnosis go to the folder."""
-    # Without `tests`, every fifth stretch of 10 s of `free` is measured on and used for nothing else. `previous`, for
+    # Without `test`, every fifth stretch of 10 s of `free` is measured on and used for nothing else. `previous`, for
     # little data: its structure stays, and its numbers are the prior. After Ctrl-C the steps that are done are kept.
     begun = perf_counter()
-    phases = Phases(PHASES, progress or (lambda state: None))
+    phases = Phases(PHASES, options.progress or (lambda state: None))
     with phases.start("reading"):
-        earlier = None if previous is None else path_of(previous)
-        case = _read(
-            path_of(finger), earlier, [[path_of(file) for file in files] for files in (free, tests, pushes)], options
-        )
+        case = _read(finger, [listed_sources(each) for each in (free, options.test, options.pushes)], options)
     run = _Run(case, Path(folder), options, phases)
-    report, data, shown = run.report()
+    report, calibrated, shown = run.report()
     report["seconds"] = perf_counter() - begun
     report = {key: finite(value) for key, value in report.items()}
-    return Calibration(data, report, run.diagnosed, shown, run.push, Path(folder))
+    return Calibration(calibrated, report, run.diagnosed, shown, run.push, Path(folder))
 
 
 # --- what is given ----------------------------------------------------------------------------------------------------
@@ -143,7 +136,7 @@ class _Case:
     free: list[FitRecording]  # what numbers, structure and thresholds are chosen on
     whole: list[FitRecording]  # the same recordings with what is held out of them
     judged: Judged
-    pushes: list[Path]
+    pushes: list[Recording]
     sentences: list[str]
     routing: RoutingEntry | None  # what was learned of it; None if it is as described
 
@@ -155,19 +148,33 @@ class _Case:
     def made_from(self) -> dict[str, Any]:
         from tendonfmu import __version__
 
-        files = [recording.path for recording in self.free]
+        previous = None if self.previous is None else digest_of(read_json(self.previous, "an earlier calibration"))
         return {
             "version": __version__,
             "finger": digest_of({"data": self.finger.data}),
-            "previous": None if self.previous is None else digest_of_file(self.previous),
-            "recordings": [(file.name, digest_of_file(file)) for file in files],
+            "previous": previous,
+            "recordings": [_digest(each.recording) for each in self.free],
             "held_out": [HELD.share, HELD.block] if self.judged.held_out else None,
         }
 
 
-def _finger(file: Path, previous: Path | None) -> Finger:
+def _refuse_twice(recordings: Sequence[Recording]) -> None:
+    """Refuse samples that are given twice, as if they were two measurements."""
+    seen: dict[str, Path] = {}
+    for recording in recordings:
+        _, digest = _digest(recording)
+        if digest in seen:
+            raise InputError(f"{recording.path}: given twice, as {seen[digest]}; expected each recording once")
+        seen[digest] = recording.path
+
+
+def _digest(recording: Recording) -> tuple[str, str]:
+    return recording.path.name, digest_of_arrays(recording.arrays())
+
+
+def _finger(source: FingerSource, previous: Path | None) -> Finger:
     """Read the finger to begin with: that of an earlier calibration, if there is one."""
-    given = read_finger(file)
+    given = read_finger(source)
     if previous is None:
         return given
     earlier = earlier_finger(given, previous)
@@ -176,18 +183,21 @@ def _finger(file: Path, previous: Path | None) -> Finger:
         ("tendons", given.tendon_names, earlier.tendon_names),
     ):
         if names != other:
-            raise InputError(f"{previous}: {what} {', '.join(other)}; expected {', '.join(names)} as of {file}")
+            raise InputError(f"{previous}: {what} {', '.join(other)}; expected {', '.join(names)} as of {given.path}")
     return earlier
 
 
-def _read(file: Path, previous: Path | None, recordings: Sequence[list[Path]], options: CalibrateOptions) -> _Case:
+def _read(source: FingerSource, recordings: Sequence[list[RecordingSource]], options: CalibrateOptions) -> _Case:
     given_free, tests, pushes = recordings
-    finger = _finger(file, previous)
+    previous = None if options.previous is None else path_of(options.previous)
+    finger = _finger(source, previous)
     if not given_free:
         raise InputError("no recording; expected at least one of free motion")
     check_given_once(given_free, tests, "a test")
     check_given_once(given_free, pushes, "one with pushes")
-    read, others, touched = ([read_recording(path) for path in group] for group in recordings)
+    read, others, touched = map(read_recordings, recordings)
+    _refuse_twice(read)
+    check_unseen(read, touched, "one with pushes")
     for recording in (*read, *others, *touched):
         recording.require(finger.joints, finger.tendons, ())
     for recording in (*read, *others):
@@ -206,7 +216,7 @@ def _read(file: Path, previous: Path | None, recordings: Sequence[list[Path]], o
     judged = Judged(whole, True) if held else Judged(prepared(others), False)
     require_noise(finger, free)
     check_unseen(read, others)
-    return _Case(finger, previous, free, whole, judged, pushes, sentences, routing)
+    return _Case(finger, previous, free, whole, judged, touched, sentences, routing)
 
 
 # --- the steps --------------------------------------------------------------------------------------------------------
@@ -224,8 +234,8 @@ class _Run:
         self.diagnosed: Diagnosis | None = None
         self.push: PushShown | None = None
 
-    def report(self) -> tuple[dict[str, Any], Data, MotionShown]:
-        """Return the report, the calibrated description, and what it leaves of a typical stretch."""
+    def report(self) -> tuple[dict[str, Any], Finger, MotionShown]:
+        """Return the report, the calibrated finger, and what it leaves of a typical stretch."""
         case, steps = self._case, self._steps
         if case.previous is None:
             page = self._folder / DIAGNOSIS / diagnosis_page.PAGE
@@ -235,12 +245,14 @@ class _Run:
             lacks = NOTHING_ASKED
             fitted = self._step("all its numbers", "refit", {}, lambda step: self._refit())
         tuned = self._step("thresholds of contact", "tune", self._of_alarms, lambda step: self._tune(fitted, step))
-        before, after = (Delivered(data, case.judged) for data in (case.finger.data, tuned["finger"]))
+        calibrated = finger_from_data(tuned["finger"], Path("calibrated"))
+        before, after = (Delivered(finger, case.judged) for finger in (case.finger, calibrated))
         error = compared(before, after, case.judged, "previous" if case.previous else "as_given")
         pushed = None
         if case.pushes:
-            files = {"pushes": [(file.name, digest_of_file(file)) for file in case.pushes]}
-            pushed = self._step("pushes", "score", files, lambda step: self._score(tuned, error["calibrated"], step))
+            files = {"pushes": list(map(_digest, case.pushes))}
+            left = error["calibrated"]
+            pushed = self._step("pushes", "score", files, lambda step: self._score(calibrated, left, step))
             example = pushed.pop("example")
             self.push = None if example is None else PushShown(**example)
         report = {
@@ -267,7 +279,7 @@ class _Run:
             "options": {**self._of_all, **self._of_alarms},
             "steps": {"seconds": self._seconds, "repeated": steps.repeated},
         }
-        return report, tuned["finger"], typical_motion(before, after, case.judged)
+        return report, calibrated, typical_motion(before, after, case.judged)
 
     def _step(
         self,
@@ -316,18 +328,22 @@ class _Run:
         case, options = self._case, self._options
 
         settings: dict[str, int] = {"threads": options.jobs, "seed": options.seed}
-        whole = fit_all(described(case.finger, lacks["extended"]), case.free, **settings)
-        most = fit_all(described(case.finger, whole.data), self._most(), **settings)
-        return {"finger": whole.data, "most": most.data, "warnings": [*whole.warnings, *left_out(whole.events)]}
+        whole = fit_all(case.finger.with_data(lacks["extended"]), case.free, **settings)
+        most = fit_all(whole.finger, self._most(), **settings)
+        return {
+            "finger": whole.finger.data,
+            "most": most.finger.data,
+            "warnings": [*whole.warnings, *left_out(whole.events)],
+        }
 
     def _refit(self) -> dict[str, Any]:
         """Fit with the previous numbers as the prior; keep those if new ones are no better on motion set apart."""
         case, inner = self._case, self._most()
         most = self._fitted_again([without_held_out(each.recording, HELD) for each in case.free])
-        before, after = (unseen_square(data, inner) for data in (case.finger.data, most.data))
+        before, after = (unseen_square(each.data, inner) for each in (case.finger, most.finger))
         if after <= before:
             whole = self._fitted_again([each.recording for each in case.free])
-            return {"finger": whole.data, "most": most.data, "warnings": list(whole.warnings)}
+            return {"finger": whole.finger.data, "most": most.finger.data, "warnings": list(whole.warnings)}
         kept = (
             f"fitted to four fifths of the motion, new numbers leave {percent((after / before) ** 0.5 - 1.0)} more of "
             "the last fifth than the earlier ones: the earlier ones are kept"
@@ -348,7 +364,7 @@ class _Run:
         """Choose thresholds with the numbers of most motion, which does not fit the rest better than other motion."""
         case, options = self._case, self._options
         tuning = ContactTuning(
-            described(case.finger, fitted["most"]),
+            case.finger.with_data(fitted["most"]),
             false_alarms_per_hour=options.false_alarms_per_hour,
             kinematics=options.kinematics,
             bias_time=BIAS_TIME,
@@ -365,12 +381,10 @@ class _Run:
         kept = {key: value for key, value in fitted["finger"].items() if key not in TUNED}
         return {**report, "finger": {**kept, **{key: value for key, value in tuned.items() if value is not None}}}
 
-    def _score(self, tuned: dict[str, Any], left: Sequence[float], step: Callable[[float], None]) -> dict[str, Any]:
-        file = self._folder / FOLDER / "tuned.json"
-        write_text(file, description_text(tuned["finger"]))
+    def _score(self, finger: Finger, left: Sequence[float], step: Callable[[float], None]) -> dict[str, Any]:
         options = ScoreOptions(kinematics=self._options.kinematics, seed=self._options.seed)
         scored = score_recordings(
-            file, self._case.pushes, options, progress=lambda done, total: step(done / max(total, 1))
+            finger, self._case.pushes, options, progress=lambda done, total: step(done / max(total, 1))
         )
         report: Mapping[str, Any] = detect_score_report.build_report(scored)
 

@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 
-from tendonfmu.arrays import Data
 from tendonfmu.detect import sample_seconds
 from tendonfmu.diagnosis import Event, Samples, events_of, without_events
 from tendonfmu.estimate import (
@@ -30,7 +29,6 @@ from tendonfmu.estimate import (
     unknowns,
     with_learned_numbers,
     with_previous_values,
-    with_values,
 )
 from tendonfmu.files import read_json
 from tendonfmu.model import Finger, read_finger
@@ -45,7 +43,7 @@ SHORTEST = 15.0  # s, least length of a stretch
 class CalibratedFit:
     """A fit of all recordings."""
 
-    data: Data
+    finger: Finger
     events: tuple[Event, ...]
     warnings: tuple[str, ...]
 
@@ -56,15 +54,14 @@ def fit_all(finger: Finger, recordings: Sequence[FitRecording], *, threads: int,
     Raises InputError.
     """
     if not unknowns(finger.data):
-        return CalibratedFit(finger.data, (), ())
+        return CalibratedFit(finger, (), ())
     events, _ = events_of(finger.data, Samples.of(finger.data, recordings, threads), seed)
     kept = [without_events(recording, events) for recording in recordings]
     structure = build_structure(finger, Choice(fix=torque_scales(finger.data)))
     settings = replace(settings_of(finger.data, kept, threads), near=True)
-    learned = learn_batch(structure, kept, Watch(None), settings, None)
-    result = with_values(structure, np.asarray(learned.estimator.values(learned.z)))
-    result = with_learned_numbers(structure, learned, result)
-    return CalibratedFit(result.data, events, tuple(learned.warnings))
+    learned = learn_batch(structure, kept, Watch(None), settings)
+    result = with_learned_numbers(structure, learned, learned.fitted(structure))
+    return CalibratedFit(result, events, tuple(learned.warnings))
 
 
 def earlier_finger(given: Finger, previous: Path) -> Finger:
@@ -82,7 +79,7 @@ def fit_again(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FitWarning)  # the report lists them
         fitting.fit(list(recordings), checked=True)
-    return CalibratedFit(fitting.description_.data, (), tuple(fitting.warnings_))
+    return CalibratedFit(fitting.description_, (), tuple(fitting.warnings_))
 
 
 # --- the stretches that a diagnosis uses ------------------------------------------------------------------------------

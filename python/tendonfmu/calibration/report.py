@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from tendonfmu.arrays import Data, Flags, Indices, Numbers
+from tendonfmu.arrays import Flags, Indices, Numbers
 from tendonfmu.detect import ContactTuning, Scored, pretension_of, sample_seconds, stretches, tune_report
 from tendonfmu.diagnosis import Diagnosis, Event
 from tendonfmu.fmu import run_model
-from tendonfmu.model import finger_from_data
+from tendonfmu.model import Finger
 from tendonfmu.recordings import FitRecording, Held, Recording, at_rows, flagged_stretches, held_out_blocks, rms
 from tendonfmu.report import MotionShown, capital, gain_text, names_of
 from tendonfmu.statistics import intervals
@@ -51,8 +51,7 @@ class Judged:
 class Delivered:
     """A finger that has run over all judged recordings."""
 
-    def __init__(self, data: Data, judged: Judged) -> None:
-        finger = finger_from_data(data, Path("finger.json"))
+    def __init__(self, finger: Finger, judged: Judged) -> None:
         self._judged = judged
         self.torque: list[Numbers] = []  # of the tendons, less a known load, N·m [N, n] of each recording
         self.left: list[Numbers] = []  # of it, less friction and bias
@@ -206,7 +205,7 @@ def typical_push(scored: Scored) -> dict[str, Any] | None:
     return {
         "recording": track.recording.path.name,
         "onset": event.onset,
-        "joint": scored.subject.finger.joint_names[j],
+        "joint": scored.finger.joint_names[j],
         "end": event.end - event.onset,
         "delay": event.delay,
         "time": (time[rows] - event.onset).tolist(),

@@ -12,7 +12,6 @@ from tendonfmu.detect import tune_report
 from tendonfmu.drawing import Sheet
 from tendonfmu.files import check_output_folder, counted, report_text, whole_file, write_text
 from tendonfmu.fmu import build_fmu
-from tendonfmu.model import description_text
 from tendonfmu.report import (
     Row,
     Table,
@@ -308,8 +307,8 @@ def check_folder(folder: Path, inputs: Sequence[Path]) -> None:
 def write_calibration(calibration: Calibration, folder: Path) -> dict[Path, str]:
     """Write the files of a calibration; each appears whole or not at all, the report last."""
     folder.mkdir(parents=True, exist_ok=True)
-    write_text(folder / FINGER, description_text(dict(calibration.data)))
-    build_fmu(folder / FINGER, folder / FMU)
+    calibration.finger.write(folder / FINGER)
+    build_fmu(calibration.finger, folder / FMU)
     write_text(folder / PAGE, calibration_page(calibration))
     written = files_of(calibration.report)
     _write_diagnosis(calibration, folder / DIAGNOSIS)
@@ -349,7 +348,7 @@ def calibration_page(calibration: Calibration) -> str:
         "calibration.html.jinja",
         sheets(calibration),
         report=report,
-        finger=friction_figure(calibration.data),
+        finger=friction_figure(calibration.finger.data),
         tone=tone,
         verdict=sentence,
         headline_numbers=list(tiles(report)),

@@ -5,14 +5,13 @@ from __future__ import annotations
 import os
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from tendonfmu import calibration, files, model
-from tendonfmu import recordings as recorded
+from tendonfmu import calibration
 from tendonfmu import report as reporting
 from tendonfmu.commands.command import ExtendedFinger, FreeAtPretensions, Progress, Scheduler, command, output_option
 from tendonfmu.commands.console import INTERRUPTED, Bar, fail, print_json, print_result, say, say_files
@@ -23,7 +22,6 @@ from tendonfmu.options import CalibrateOptions, RecordingSources, keywords
 if TYPE_CHECKING:
     from tendonfmu.calibration import Calibration
     from tendonfmu.model import Finger, FingerSource
-    from tendonfmu.recordings import RecordingSource
 
 
 class CalibrationWarning(UserWarning):
@@ -49,7 +47,7 @@ class CalibrateResult(Result):
     @property
     def finger(self) -> Finger:
         """The calibrated finger."""
-        return model.finger_from_data(self.calibration.data, Path("calibrated"))
+        return self.calibration.finger
 
     @property
     def report(self) -> Mapping[str, Any]:
@@ -95,42 +93,11 @@ def calibrate(finger: FingerSource, free: RecordingSources, options: CalibrateOp
     CalibrationWarning
         Remarks on the recordings and the result; also in `CalibrateResult.warnings`.
     """
-    with tempfile.TemporaryDirectory() as folder:
-        scratch, described = Path(folder), model.read_finger(finger)
-        given = files.StandIn.of(scratch / "finger.json", str(described.path))
-        files.write_text(given, model.description_text(described.to_dict()))
-        groups = {"free": free, "test": options.test, "pushes": options.pushes}
-        free_files, tests, pushes = (_files(scratch / name, sources) for name, sources in groups.items())
-        found = calibration.calibrate(
-            given,
-            free_files,
-            Path(options.folder or scratch / "calibrated"),
-            tests=tests,
-            pushes=pushes,
-            previous=None if options.previous is None else Path(options.previous),
-            options=options,
-            progress=options.progress,
-        )
-    result = CalibrateResult(found)
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = options.folder or Path(scratch) / "calibrated"
+        result = CalibrateResult(calibration.calibrate(finger, free, folder, options))
     result.warn(CalibrationWarning)
     return result
-
-
-def _files(folder: Path, sources: RecordingSource | Sequence[RecordingSource] | None) -> list[Path]:
-    """Return the files of recordings; those in memory are written into a folder."""
-    listed = [] if sources is None else recorded.listed_sources(sources)
-    paths = []
-    for source, recording in zip(listed, recorded.read_recordings(listed), strict=True):
-        if isinstance(source, str | os.PathLike):
-            paths.append(Path(source))
-            continue
-        file = folder / f"{Path(recording.path).stem}.parquet"
-        while file.exists():
-            file = file.with_name(f"{file.stem}_.parquet")
-        folder.mkdir(exist_ok=True)
-        recording.write(file)
-        paths.append(files.StandIn.of(file, str(recording.path)))
-    return paths
 
 
 @command("calibrate", CalibrateOptions, of=calibrate)
@@ -158,16 +125,8 @@ def calibrate_files(
     calibration.check_folder(output, [finger, *recordings, *options.files("test", "pushes", "previous")])
     try:
         with Bar(progress) as bar:
-            found = calibration.calibrate(
-                finger,
-                recordings,
-                output,
-                tests=options.files("test"),
-                pushes=options.files("pushes"),
-                previous=next(iter(options.files("previous")), None),
-                options=options,
-                progress=bar.phase,
-            )
+            given = replace(options, progress=bar.phase)
+            found = calibration.calibrate(finger, recordings, output, given)
             bar("writing the files")
             written = calibration.write_calibration(found, output)
     except KeyboardInterrupt as stopped:

@@ -7,7 +7,6 @@ Every command takes `--json` and `--quiet`; a command with options shared by sev
 from __future__ import annotations
 
 import inspect
-import json
 import math
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -128,13 +127,9 @@ def of_hand(name: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
 
 def is_hand(path: Path) -> bool:
     """Return whether a file claims to be a hand, even an invalid one."""
-    if path.suffix.lower() != ".json":
-        return False
-    try:
-        data = json.loads(path.read_bytes())
-    except (OSError, ValueError, RecursionError):
-        return False
-    return isinstance(data, dict) and str(data.get("format", "")).startswith("tendonfmu-hand-")
+    from tendonfmu.files import format_of
+
+    return path.suffix.lower() == ".json" and format_of(path).startswith("tendonfmu-hand-")
 
 
 def for_typer(name: str) -> Callable[..., None]:

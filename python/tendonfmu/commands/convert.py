@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tendonfmu import files
+from tendonfmu import files, model
 from tendonfmu import recordings as recorded
 from tendonfmu.commands import console
 from tendonfmu.commands.command import command
@@ -48,11 +48,7 @@ def convert(log: str | os.PathLike[str], map: Mapping[str, Any] | str | os.PathL
     InputError
         The log or the map does not allow it.
     """
-    with tempfile.TemporaryDirectory() as scratch:
-        file = files.StandIn.of(Path(scratch) / "map.json", "map") if isinstance(map, Mapping) else Path(map)
-        if isinstance(map, Mapping):
-            file.write_text(json.dumps(map), encoding="utf-8")
-        columns = recorded.convert_table(Path(log), file).columns
+    columns = recorded.convert_table(Path(log), map if isinstance(map, Mapping) else Path(map)).columns
     return recorded.Recording.from_frame(files.frame_of(columns), name=str(log))
 
 
@@ -258,7 +254,7 @@ def _write_in_blocks(conversion: Conversion, output: Path) -> tuple[int, float]:
 
 def _convert_with_finger(file: Path, output: Path, map_file: Path, finger: Path) -> dict[str, Any]:
     log = recorded.convert_table(file, map_file)
-    description = recorded.description_text(recorded.describe_joint(log))
+    description = model.description_text(recorded.describe_joint(log))
     console.write_table(output, log.columns)
     files.write_text(finger, description)
     time = log.columns["time"]

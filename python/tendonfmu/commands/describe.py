@@ -90,7 +90,7 @@ def describe_files(
         files.check_format(recording)
         files.check_output(output, recording)
         document = recorded.describe_recorded_joint(name, recorded.read_recording(recording), moment_arm)
-    files.write_text(output, recorded.description_text(document))
+    files.write_text(output, model.description_text(document))
     law = document["joints"][0]["friction"]
     say(
         f"{output}: {name}, coulomb {law['coulomb']:g} N.m, viscous {law['viscous']:g} N.m.s/rad to start from; "

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tendonfmu import drawing, estimate, files, fmu, model
+from tendonfmu import drawing, estimate, files, fmu
 from tendonfmu import report as reporting
 from tendonfmu.commands.command import FingerFile, FreeRecordings, Progress, Report, command, output_option
 from tendonfmu.commands.console import INTERRUPTED, Bar, deliver, fail, say, say_files
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 class FitInterrupted(KeyboardInterrupt):
-    """Ctrl-C ended a fit; `unfinished` holds its best estimate so far."""
+    """Ctrl-C ended a fit; `unfinished` is the finger with its best estimate so far."""
 
     def __init__(self, unfinished: Any) -> None:
         super().__init__("fit interrupted")
@@ -117,13 +117,12 @@ class FitResult(Result):
 
     def _set_parameters(self) -> list[SetParameter]:
         """Return the estimated numbers, and static friction that is equal to an estimated Coulomb friction."""
-        finger = model.native.Instance(self.finger.image)
-        known = {parameter.path for parameter in finger.parameters()}
+        known = self.finger.numbers
         return [
-            fmu.SetParameter(path, finger.get(path), fitted.standard_error, fitted.identified)
+            fmu.SetParameter(path, known[path].start, fitted.standard_error, fitted.identified)
             for fitted in self.estimator.numbers_
             for path in (fitted.number.path, fitted.number.with_path)
-            if path in known
+            if path is not None and path in known
         ]
 
     def plot(self) -> Any:
@@ -204,7 +203,7 @@ def fit_files(
     progress: Progress = None,
 ) -> None:
     """Ctrl-C saves the best estimate so far in FITTED.unfinished.json."""
-    inputs = [finger, *recordings, *options.files("compare", "previous", "resume")]
+    inputs = [finger, *recordings, *options.files("compare", "previous")]
     estimate.check_outputs(output, report, figures, inputs)
     if ssv is not None:
         fmu.check_parameter_set_path(ssv, *inputs)
@@ -213,8 +212,9 @@ def fit_files(
             warnings.simplefilter("ignore", estimate.FitWarning)  # printed with the result, one line each
             result = fit(finger, recordings, **vars(options) | {"progress": bar.fit})
     except FitInterrupted as stopped:
-        left = estimate.write_unfinished(output, stopped.unfinished)
-        fail(f"interrupted; the best estimate so far is in {left}; continue with --resume {left}")
+        left = output.with_name(f"{output.stem}.unfinished.json")
+        stopped.unfinished.write(left)
+        fail(f"interrupted; the best estimate so far is in {left}, a description that fit can start from")
         sys.exit(INTERRUPTED)
     if ssv is not None:
         result.write(ssv)

@@ -31,28 +31,11 @@ class Sample:
         Arrays of all outputs by name, those of links, contact.rest and sensor_fault included.
     """
 
-    __slots__ = (
-        "_contact",
-        "bias_torque",
-        "compensated_torque",
-        "compensated_torque_std",
-        "friction_torque",
-        "joint_angle",
-        "joint_contact",
-        "joint_speed",
-        "joint_torque",
-        "outputs",
-        "slack",
-    )
-
     def __init__(self, outputs: dict[str, NDArray[np.generic]]) -> None:
         for values in outputs.values():
             values.flags.writeable = False
         self.outputs = outputs
-        self._contact = outputs["contact"]
-        for name in self.__slots__:
-            if name in outputs:
-                setattr(self, name, outputs[name])
+        vars(self).update({name: values for name, values in outputs.items() if name != "contact"})
 
     compensated_torque: Numbers
     joint_torque: Numbers
@@ -67,7 +50,7 @@ class Sample:
     @property
     def contact(self) -> bool:
         """Whether any joint is in contact."""
-        return bool(self._contact[0])
+        return bool(self.outputs["contact"][0])
 
     def __repr__(self) -> str:
         torques = ", ".join(f"{value:.4g}" for value in self.compensated_torque)
@@ -156,10 +139,8 @@ class Runner:
     def _take_converted(self, time: float, given: tuple[ArrayLike | None, ...]) -> None:
         """Take a sample of anything that numpy makes arrays of."""
         arrays = [_row(name, values) for name, values in zip(_INPUTS, given, strict=True)]
-        try:
+        with native.refusals_of(f"sample at {time!r} s"):
             self._take(_number(time), *arrays)
-        except native.NativeError as refused:
-            raise InputError(f"sample at {time!r} s: {refused}") from None
 
     def reset(self) -> None:
         """Forget all samples."""

@@ -11,6 +11,7 @@ from tendonfmu import files, mjcf
 from tendonfmu.commands.command import command, output_option
 from tendonfmu.commands.console import print_json, say, warn
 from tendonfmu.errors import InputError
+from tendonfmu.model import description_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -78,7 +79,7 @@ def import_model(
         name=name,
     )
     finger = mjcf.import_finger(model, settings)
-    files.write_text(output, finger.text)
+    files.write_text(output, description_text(finger.data))
     _say_rows(model, "", finger.notes)
     for sentence in finger.warnings:
         warn(sentence)

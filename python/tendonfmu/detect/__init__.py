@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from .free_motion import SETTLING, free_parts, require_no_contact
     from .noise import pretension_of
     from .score_types import ScoreReport
-    from .scoring import Scored, Subject, Track, run_track, score_recordings
+    from .scoring import Scored, Track, run_track, score_recordings
     from .summary import RocPoint, Summary
     from .tune_types import TuneReport
     from .tuning import ContactTuning, NotEnough, TuneWarning

@@ -183,10 +183,9 @@ def runs_of(data: Data, parts: Sequence[FreePart]) -> Iterator[tuple[FreePart, d
     begin = finger.save_state()
     for part in parts:
         finger.restore_state(begin)
-        try:
-            yield part, finger.run(part.arrays)
-        except native.NativeError as refused:
-            raise InputError(f"{part.source}: {refused}") from None
+        with native.refusals_of(part.source):
+            outputs = finger.run(part.arrays)
+        yield part, outputs
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,6 @@ from scipy.stats import genpareto
 
 from tendonfmu.arrays import Array, Data, Flags, Indices, Numbers, rounded
 from tendonfmu.detect.free_motion import FreePart
-from tendonfmu.errors import InputError
 from tendonfmu.model import native
 
 # --- terms of a bound -------------------------------------------------------------------------------------------------
@@ -78,10 +77,8 @@ def run_free(data: Data, parts: Sequence[FreePart]) -> tuple[list[Terms], list[d
         pieces, outputs = [], []
         for begin in range(0, len(part.time), _BLOCK):
             rows = slice(begin, begin + _BLOCK)
-            try:
+            with native.refusals_of(part.source):
                 run = finger.run({name: values[rows] for name, values in part.arrays.items()}, terms=True)
-            except native.NativeError as refused:
-                raise InputError(f"{part.source}: {refused}") from None
             pieces.append(terms_of(part.time[rows], run["contact_terms"], part.counted[rows]))
             outputs.append({name: run[name] for name in _KEPT})
         terms.append(Terms(*(np.concatenate([getattr(piece, name) for piece in pieces]) for name in vars(pieces[0]))))

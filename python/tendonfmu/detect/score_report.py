@@ -36,9 +36,9 @@ def build_report(scored: Scored) -> ScoreReport:
     """Build the report of a finished score; numbers that are not finite become None."""
     report: ScoreReport = {
         "format": FORMAT,
-        "finger": scored.subject.finger.name,
-        "model": str(scored.subject.path),
-        "joints": scored.subject.finger.joint_names,
+        "finger": scored.finger.name,
+        "model": str(scored.finger.path),
+        "joints": scored.finger.joint_names,
         "kinematics": scored.options.kinematics,
         "labels": LABEL if scored.options.labels is None else scored.options.labels,
         "definitions": {"merged_s": MERGED, "silent_s": SILENT, "grace_s": GRACE},

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import os
-import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,14 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.arrays import Data, Flags, Numbers
+from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.detect.counting import DetectionScore, Signals, pooled, score_detection
 from tendonfmu.detect.free_motion import sensed_contact
 from tendonfmu.detect.summary import FACTORS, RocPoint, Summary, roc, summarise
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import check_given_once
 from tendonfmu.files import counted
-from tendonfmu.fmu import check_model, outputs_of, run_fmu
+from tendonfmu.fmu import check_model, finger_of, outputs_of, run_fmu
 from tendonfmu.model import Finger, FingerSource, finger_file, inputs_used, native, read_finger, watches_motors
 from tendonfmu.options import ScoreOptions
 from tendonfmu.recordings import GROUP_PER, LABEL, Recording, RecordingSource, gaps, listed_sources, read_recordings
@@ -28,16 +26,7 @@ from tendonfmu.recordings import GROUP_PER, LABEL, Recording, RecordingSource, g
 Progress = Callable[[int, int], None]
 
 USUAL = ScoreOptions()
-THRESHOLDS = ("threshold", "threshold_per_force")
-
-
-@dataclass(frozen=True)
-class Subject:
-    """What is scored."""
-
-    path: Path  # file as given, or the name of a finger in memory
-    finger: Finger  # its description
-    packed: bool  # whether the file is an FMU; then the FMU runs
+BOUNDS = ("contact.threshold", "contact.bands")  # how their paths begin
 
 
 @dataclass(frozen=True)
@@ -81,7 +70,7 @@ class Track:
 class Scored:
     """A finished score."""
 
-    subject: Subject  # what was scored
+    finger: Finger  # what was scored; that of an FMU has its path
     options: ScoreOptions
     tracks: Sequence[Track]  # by recording
     scores: Sequence[DetectionScore]
@@ -107,14 +96,14 @@ def score_recordings(
     """Score a finger, or its FMU, on recordings."""
     sources = listed_sources(recordings)
     check_given_once(sources, [])
-    subject = read_subject(model)
+    finger, fmu = _read_model(model)
     column = LABEL if options.labels is None else options.labels
     read = _read(sources, column, options.force)
     if not read:
         raise InputError("no recording; expected at least one")
     read, warnings = _labelled(read, options.labels)
     warnings += _without_force(read, options.force)
-    factors = () if subject.packed else FACTORS
+    factors = FACTORS if fmu is None else ()
     done, total = 0, len(read) * (1 + len(factors))
 
     def count(runs: int) -> None:
@@ -124,29 +113,29 @@ def score_recordings(
             progress(done, total)
 
     def score_at(factor: float) -> DetectionScore:
-        score = score_scaled(subject, tracks, options.kinematics, factor)
+        score = _score_scaled(finger, tracks, options.kinematics, factor)
         count(len(tracks))
         return score
 
     tracks: list[Track] = []
     for recording in read:
-        tracks.append(run_track(subject, recording, options.kinematics, options.force))
+        tracks.append(run_track(finger, recording, options.kinematics, options.force, fmu))
         warnings += _gaps(recording)
         count(1)
     scores = [track.score() for track in tracks]
     summary = summarise(pooled(scores), options.seed)
     return Scored(
-        subject=subject,
+        finger=finger,
         options=options,
         tracks=tracks,
         scores=scores,
         summaries=[summarise(score, options.seed) for score in scores],
         summary=summary,
-        roc=None if subject.packed else roc(score_at),
+        roc=roc(score_at) if fmu is None else None,
         warnings=[
             *warnings,
             *([] if summary.events else [f"no event in column {column}: false alarms only"]),
-            *_opposed(summary, subject.finger.joint_names),
+            *_opposed(summary, finger.joint_names),
         ],
     )
 
@@ -228,37 +217,25 @@ def _gaps(recording: Recording) -> list[str]:
 # --- runs -------------------------------------------------------------------------------------------------------------
 
 
-def read_subject(source: FingerSource) -> Subject:
+def _read_model(source: FingerSource) -> tuple[Finger, Path | None]:
     """Read a finger, or an FMU with the description it was made of. Raises InputError."""
     if not isinstance(source, str | os.PathLike):
-        finger = read_finger(source)
-        return Subject(finger.path, finger, packed=False)
+        return read_finger(source), None
     model = finger_file(source)
     check_model(model)
-    if model.suffix.lower() == ".json":
-        return Subject(model, read_finger(model), packed=False)
-    try:
-        with zipfile.ZipFile(model) as archive:
-            text = archive.read("resources/finger.json")
-    except (OSError, zipfile.BadZipFile):
-        raise InputError(f"{model}: not an FMU; expected FINGER.json or FINGER.fmu") from None
-    except KeyError:
-        raise InputError(f"{model}: lacks resources/finger.json; expected an FMU of `tendonfmu build`") from None
-    try:
-        native.image_from_json(text)
-        return Subject(model, Finger(model, json.loads(text)), packed=True)
-    except ValueError as refused:
-        raise InputError(f"{model}: resources/finger.json: {refused}") from None
+    finger = finger_of(model)
+    if finger is None:
+        raise InputError(f"{model}: lacks resources/finger.json; expected an FMU of `tendonfmu build`")
+    return finger, None if model.suffix.lower() == ".json" else model
 
 
-def run_track(subject: Subject, recording: Recording, kinematics: int, force: str | None) -> Track:
-    """Run the subject over a recording."""
-    # force: (N)
-    data = subject.finger.data
-    joints, tendons = len(data["joints"]), len(data["tendons"])
-    recording.require(joints, tendons, inputs_used(kinematics, watches_motors(data)))
-    core = _run(subject.finger.image, recording, kinematics)
-    packed = subject.packed and outputs_of(run_fmu(subject.path, recording, kinematics_source=kinematics))
+def run_track(
+    finger: Finger, recording: Recording, kinematics: int, force: str | None = None, fmu: Path | None = None
+) -> Track:
+    """Run a finger, or its FMU, over a recording; `force` is the column of the sensed force (N)."""
+    recording.require(finger.joints, finger.tendons, inputs_used(kinematics, watches_motors(finger.data)))
+    core = _run(finger, recording, kinematics)
+    packed = fmu and outputs_of(run_fmu(fmu, recording, kinematics_source=kinematics))
     label = np.zeros(len(recording), dtype=bool) if recording.contact is None else recording.contact
     sensed = None if force is None else recording.others.get(force)
     residual = core["residual"].copy()  # no output of an FMU; 0 at the first sample
@@ -266,30 +243,26 @@ def run_track(subject: Subject, recording: Recording, kinematics: int, force: st
     return Track(recording, label, packed or core, residual, sensed)
 
 
-def _run(image: bytes, recording: Recording, kinematics: int) -> dict[str, NDArray[Any]]:
-    try:
-        return native.Instance(image, kinematics).run(recording.arrays())
-    except native.NativeError as refused:
-        raise InputError(f"{recording.path}: {refused}") from None
+def _run(
+    finger: Finger, recording: Recording, kinematics: int, values: Mapping[str, float] | None = None
+) -> dict[str, NDArray[Any]]:
+    """Run a finger, with some other numbers by path."""
+    instance = native.Instance(finger.image, kinematics)
+    instance.set(values or {})
+    with native.refusals_of(recording.path):
+        return instance.run(recording.arrays())
 
 
 # --- other thresholds -------------------------------------------------------------------------------------------------
 
 
-def scaled_detection(data: Data, factor: float) -> dict[str, Any]:
-    """Return the description with every bound that decides on contact times a factor."""
-    contact = {**data["contact"], **_scaled(data["contact"], THRESHOLDS, factor)}
-    if contact.get("bands") is not None:
-        contact["bands"] = [_scaled(band, tuple(band), factor) for band in contact["bands"]]
-    return {**data, "contact": contact}
+def scaled_bounds(finger: Finger, factor: float) -> dict[str, float]:
+    """Return every bound that decides on contact, by path, times a factor."""
+    return {path: factor * each.start for path, each in finger.numbers.items() if path.startswith(BOUNDS)}
 
 
-def _scaled(part: Mapping[str, Any], keys: Sequence[str], factor: float) -> dict[str, Any]:
-    return {key: [factor * each for each in part[key]] for key in keys if part.get(key) is not None}
-
-
-def score_scaled(subject: Subject, tracks: Sequence[Track], kinematics: int, factor: float) -> DetectionScore:
-    """Score all recordings again with scaled detection, pooled, with only what the ROC shows."""
-    image = native.image_from_json(json.dumps(scaled_detection(subject.finger.data, factor)))
-    runs = (replace(track, outputs=_run(image, track.recording, kinematics)) for track in tracks)
+def _score_scaled(finger: Finger, tracks: Sequence[Track], kinematics: int, factor: float) -> DetectionScore:
+    """Score all recordings again with scaled bounds, pooled, with only what the ROC shows."""
+    values = scaled_bounds(finger, factor)
+    runs = (replace(track, outputs=_run(finger, track.recording, kinematics, values)) for track in tracks)
     return pooled([run.decisions() for run in runs])

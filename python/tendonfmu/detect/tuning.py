@@ -46,7 +46,7 @@ from tendonfmu.detect.sensor_faults import SensorRule, learn_sensors
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import check_given_once
 from tendonfmu.files import are, counted
-from tendonfmu.model import Finger, description_text, finger_from_data, read_finger
+from tendonfmu.model import Finger, read_finger
 from tendonfmu.options import Configured, Options, TuneOptions
 from tendonfmu.recordings import RecordingSource, admit, listed_sources, read_recordings
 
@@ -241,7 +241,7 @@ class ContactTuning(Configured):
         if self.sensors_.keys is not None:
             self._data["sensor_fault"] = dict(self.sensors_.keys)
         rule = self._learn_rule(terms)
-        self.description_ = finger_from_data(self._with(rule, learned=True), self._start.path)
+        self.description_ = self._start.with_data(self._with(rule, learned=True))
         left = np.sqrt(np.mean(self.residuals_.residual**2, axis=0))
         self.push_: Numbers = push_sizes(self.description_.data, parts, left)
         self.seconds_ = perf_counter() - begin
@@ -353,10 +353,6 @@ class ContactTuning(Configured):
             self.warnings_.append(
                 f"compensated_torque_std is too large at {', '.join(wide)}: that of the bias exceeds the residuals"
             )
-
-    def description_text(self) -> str:
-        """Return the tuned description as JSON, as `tendonfmu tune -o` writes it."""
-        return description_text(self.description_.data)
 
 
 # --- what is left out together ----------------------------------------------------------------------------------------

@@ -20,8 +20,8 @@ from tendonfmu.diagnosis.effects import MECHANISMS, SHARED, Mechanism, Place, Te
 from tendonfmu.diagnosis.extension_fit import structure_of
 from tendonfmu.diagnosis.samples import Samples, Span, span_of, with_late_forces
 from tendonfmu.errors import TooLargeError
-from tendonfmu.estimate import SCALING, Estimator, own_copy, set_number
-from tendonfmu.model import law_path, native, steps_of
+from tendonfmu.estimate import SCALING, Estimator
+from tendonfmu.model import law_path, native, own_copy, set_number, steps_of
 
 Single = NDArray[np.float32]
 Worth = Callable[[Mechanism, Place, Mapping[str, float]], bool]

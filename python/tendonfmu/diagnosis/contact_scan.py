@@ -27,7 +27,6 @@ from tendonfmu.arrays import Data, Flags, Numbers, flagged_rows
 from tendonfmu.detect import (
     SETTLING,
     ContactTuning,
-    Subject,
     TuneWarning,
     free_parts,
     pooled,
@@ -325,8 +324,8 @@ def detection_gain(nominal: Data, extended: Data, recordings: Sequence[FitRecord
         tuned = [_tuned(data, free, kinematics, min(max(RATE, 1.0 / hours), HIGHEST)) for data in (nominal, extended)]
     except InputError:  # nothing can be tuned, for example with a bias without drift
         return None
-    subjects = [Subject(Path("finger"), finger_from_data(tuning.description_.data), packed=False) for tuning in tuned]
-    before, after = (pooled([run_track(one, each, kinematics, None).score() for each in labelled]) for one in subjects)
+    fingers = [finger_from_data(tuning.description_.data) for tuning in tuned]
+    before, after = (pooled([run_track(one, each, kinematics).score() for each in labelled]) for one in fingers)
     delays = [float(np.median(score.delays)) if len(score.delays) else None for score in (before, after)]
     return DetectionGain(
         events=len(before.events),

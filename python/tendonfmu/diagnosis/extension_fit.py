@@ -26,16 +26,22 @@ from tendonfmu.estimate import (
     MemoryProblem,
     Structure,
     build_structure,
-    get_number,
     guess_prior,
     minimise,
-    own_copy,
-    set_number,
     unknowns,
     with_known_numbers,
     with_values,
 )
-from tendonfmu.model import effects, extension_rows, finger_from_data, law_path, native
+from tendonfmu.model import (
+    effects,
+    extension_rows,
+    finger_from_data,
+    get_number,
+    law_path,
+    native,
+    own_copy,
+    set_number,
+)
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import MEMORY, Interval
 

@@ -12,7 +12,6 @@ measured forces less the unexplained torque, which is spread over the tendons as
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -20,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.arrays import Array, Data, Flags, Numbers
-from tendonfmu.estimate import CoreRuns, SlowDrift, slowest_drift
+from tendonfmu.estimate import CoreRuns, SlowDrift, image_that_holds, slowest_drift
 from tendonfmu.model import extension_rows, moment_arms, native, number_of, without_learning
 from tendonfmu.recordings import FitRecording, Grid, Segment, delayed_torque
 from tendonfmu.statistics import BlockSeries, Splines
@@ -44,9 +43,7 @@ class Series(BlockSeries):
 
 def exact_model(data: Mapping[str, Any], recording: FitRecording, *, jumps: bool = True) -> Numbers:
     """Return G of a description from a run of the core, N·m [N, n]; NaN outside of the parts."""
-    bare = without_learning(data)  # with a bias that only jumps, and without contact detection
-    image = native.image_from_json(json.dumps({**bare, "bias": {**bare["bias"], "forget_rate": 0.0}}))
-    residual = np.full(recording.target.shape, np.nan)
+    image, residual = image_that_holds(without_learning(data)), np.full(recording.target.shape, np.nan)
     for part in recording.parts:
         arrays = recording.arrays(part)
         outputs = native.Instance(image, kinematics_source=recording.kinematics).run(arrays)

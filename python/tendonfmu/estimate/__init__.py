@@ -10,7 +10,7 @@ from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from . import identifiability, verdicts
-    from .core_runs import CoreRuns, SlowDrift, slowest_drift
+    from .core_runs import CoreRuns, SlowDrift, image_that_holds, slowest_drift
     from .estimation import ESTIMATION_MISSING, HAS_ESTIMATION, EstimationError, Estimator, Unknown
     from .files import (
         FIT_REPORT,
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
         known_numbers,
         read_previous_fit,
         with_previous_values,
-        write_unfinished,
     )
     from .fisher_information import Noise, Progress, information, noise_of, sensitivities, unknowns
     from .fit_report import FitPicture, FitSeries, LawBands, LawCurve, asymmetric, evaluate, numbers_of, unseen_square
@@ -48,10 +47,6 @@ if TYPE_CHECKING:
         Choice,
         Structure,
         build_structure,
-        described,
-        get_number,
-        own_copy,
-        set_number,
         torque_scales,
         with_values,
     )

@@ -1,9 +1,8 @@
-"""The files of a fit: what may be read and written, the state of an interrupted fit, and an earlier fit as prior."""
+"""The files of a fit: what may be read and written, and an earlier fit as prior."""
 
 from __future__ import annotations
 
 import filecmp
-import json
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,13 +15,12 @@ from tendonfmu.arrays import Data, Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.fisher_information import Unknown
 from tendonfmu.estimate.identifiability import LIMIT
-from tendonfmu.estimate.structure import MAGNITUDES, described, estimable_numbers, own_copy, set_number
-from tendonfmu.files import check_output, check_output_folder, read_json, write_text
-from tendonfmu.model import Finger, finger_from_data, read_finger
+from tendonfmu.estimate.structure import MAGNITUDES, estimable_numbers
+from tendonfmu.files import check_output, check_output_folder, read_json
+from tendonfmu.model import Finger, own_copy, read_finger, set_number
 from tendonfmu.recordings import Recording
 
 FIT_REPORT: Final = "tendonfmu-fit-1"
-UNFINISHED = "tendonfmu-fit-unfinished-1"
 
 
 def check_outputs(output: Path, report: Path | None, figures: Path | None, inputs: Sequence[Path]) -> None:
@@ -80,76 +78,6 @@ def check_unseen(training: Iterable[Recording], tests: Iterable[Recording], role
 def _measured(recording: Recording) -> Numbers:
     """Return [N, 2m] tendon forces and positions."""
     return np.hstack([recording.groups["tendon_force"], recording.groups["tendon_position"]])
-
-
-# --- an interrupted fit -----------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Unfinished:
-    """State of an interrupted fit: the best estimate so far."""
-
-    finger: str  # name of the finger
-    method: str  # "batch" or "ekf"
-    z: Numbers  # [u] unknowns
-    unknowns: Sequence[str]  # [u] "path role" of each unknown
-    cost: float  # negative log likelihood with the prior, or NaN
-    options: Mapping[str, Any]  # options of the fit
-    description: Mapping[str, Any]  # description with the values of z
-
-
-def write_unfinished(output: Path, state: Unfinished) -> Path:
-    """Write the state of an interrupted fit next to its output."""
-    content = {
-        "format": UNFINISHED,
-        "finger": state.finger,
-        "method": state.method,
-        "cost": state.cost if np.isfinite(state.cost) else None,
-        "options": dict(state.options),
-        "unknowns": list(state.unknowns),
-        "z": [float(value) for value in state.z],
-        "description": dict(state.description),
-    }
-    path = output.with_name(f"{output.stem}.unfinished.json")
-    write_text(path, json.dumps(content, indent=1, ensure_ascii=False) + "\n")
-    return path
-
-
-def read_unfinished(path: Path) -> Unfinished:
-    """Read the state of an interrupted fit."""
-    content = read_json(path, "the state of an interrupted fit")
-    if not isinstance(content, dict) or content.get("format") != UNFINISHED:
-        given = content.get("format") if isinstance(content, dict) else None
-        raise InputError(f'{path}: format = {json.dumps(given)}; expected "{UNFINISHED}", that of an interrupted fit')
-    numbers, names, data = content.get("z"), content.get("unknowns"), content.get("description")
-    if not isinstance(numbers, list) or not all(type(z) in (int, float) for z in numbers):
-        raise InputError(f"{path}: z: expected a list of numbers")
-    if not isinstance(names, list) or len(names) != len(numbers) or not isinstance(data, dict):
-        raise InputError(
-            f"{path}: unknowns, description: expected one name for each of the {len(numbers)} z, and an object"
-        )
-    return Unfinished(
-        finger=str(content.get("finger")),
-        method=str(content.get("method")),
-        z=np.array(numbers, dtype=float),
-        unknowns=[str(name) for name in names],
-        cost=float("nan") if content.get("cost") is None else float(content["cost"]),
-        options=content.get("options") or {},
-        description=data,
-    )
-
-
-def resumed_start(path: Path, unknowns: Sequence[str]) -> Numbers:
-    """Return [u] the unknowns to continue from. Raises InputError unless both fits estimate the same unknowns."""
-    state = read_unfinished(path)
-    if list(state.unknowns) == list(unknowns):
-        return state.z
-    other = sorted(set(state.unknowns) ^ set(unknowns))
-    what = f"{other[0]} is not in both" if other else "in another order"
-    raise InputError(
-        f"{path}: the interrupted fit has {len(state.unknowns)} unknowns, this fit has {len(unknowns)} ({what}); "
-        "expected the same finger, --asymmetric, --only, --fix and --share"
-    )
 
 
 # --- an earlier fit ---------------------------------------------------------------------------------------------------
@@ -222,7 +150,7 @@ def with_previous_values(finger: Finger, previous: PreviousFit) -> Finger:
         for path in (number.path, number.with_path):
             if path is not None:
                 set_number(data, path, previous.values[number.path])
-    return described(finger, data)
+    return finger.with_data(data)
 
 
 # --- `estimated` in a description -------------------------------------------------------------------------------------
@@ -244,7 +172,7 @@ def with_estimates(finger: Finger, numbers: Sequence[Unknown], covariance: Numbe
         entries.pop(path, None)
         if error <= LIMIT * float(weight @ size):
             entries[path] = [float(weight @ value), float(f"{error:.{DIGITS}g}")]
-    return finger_from_data({**finger.data, "estimated": entries or None}, finger.path)
+    return finger.with_data({**finger.data, "estimated": entries or None})
 
 
 def known_numbers(data: Data) -> dict[str, tuple[float, float]]:

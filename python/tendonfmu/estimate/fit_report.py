@@ -27,7 +27,7 @@ from tendonfmu.estimate.learning import Learned, unknown_names
 from tendonfmu.estimate.verdicts import CAUSES, Fitted
 from tendonfmu.files import counted, finite
 from tendonfmu.json_types import Values
-from tendonfmu.model import Effect, Finger, Instance, Law, native, without_friction
+from tendonfmu.model import Effect, Finger, Law, without_friction
 from tendonfmu.recordings import FitRecording, Model, RoutingEntry, consistency, rms, whiteness
 from tendonfmu.statistics import effective_samples
 
@@ -97,7 +97,6 @@ def build_report(
     memory: MemoryEntry | None,  # how friction that remembers was fitted; None if there is none
 ) -> FitReport:
     """Build the report of a finished fit; numbers that are not finite become None."""
-    units = {parameter.path: parameter.unit for parameter in native.Instance(fitted.image).parameters()}
     trained = residual_entry(training, "train")
     assert trained is not None, "a fit is trained on something"
     report: FitReport = {
@@ -113,7 +112,7 @@ def build_report(
         "options": dict(options),
         "warnings": list(warnings),
         "recordings": [evaluation.recording.entry() for evaluation in training],
-        "parameters": [_parameter(number, units) for number in numbers],
+        "parameters": [_parameter(number, fitted) for number in numbers],
         "correlation": {
             "paths": unknown_names(learned.estimator),
             "standard_errors": np.sqrt(np.maximum(np.diag(learned.covariance), 0.0)).tolist(),
@@ -133,10 +132,10 @@ def build_report(
     return finite(report)
 
 
-def _parameter(number: Fitted, units: Mapping[str, str]) -> FittedNumber:
+def _parameter(number: Fitted, finger: Finger) -> FittedNumber:
     return {
         "path": number.number.path,
-        "unit": units[number.number.path],
+        "unit": finger.numbers[number.number.path].unit,
         "start": number.start,
         "value": number.value,
         "standard_error": number.standard_error,
@@ -365,8 +364,7 @@ class LawBands:
     """Curves of the laws of a fit, with their confidence bands."""
 
     def __init__(self, picture: FitPicture) -> None:
-        parameters = Instance(picture.fitted.image).parameters()
-        paths = [parameter.path for parameter in parameters]
+        paths = list(picture.fitted.numbers)
         self._covariance = np.asarray(picture.covariance)
         self._column = {
             (paths[k], unknown.role): column

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import fields, replace
-from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any, ClassVar
@@ -17,11 +16,9 @@ from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.files import (
     PreviousFit,
-    Unfinished,
     check_given_once,
     estimated_numbers,
     read_previous_fit,
-    resumed_start,
     with_estimates,
     with_previous_values,
 )
@@ -38,12 +35,12 @@ from tendonfmu.estimate.fit_report import (
     unseen_square,
 )
 from tendonfmu.estimate.identifiability import EffectCoverage, coverage_of, with_laws_of
-from tendonfmu.estimate.learning import FrictionFitOptions, Interrupted, Learned, Watch, settings_of, unknown_names
+from tendonfmu.estimate.learning import FrictionFitOptions, Interrupted, Learned, Watch, settings_of
 from tendonfmu.estimate.memory_choice import Remembered, learn_remembered
 from tendonfmu.estimate.methods import learn_batch, learn_ekf
 from tendonfmu.estimate.structure import Choice, build_structure, torque_scales, with_values
 from tendonfmu.estimate.verdicts import Fitted, judge_numbers, sizes_of
-from tendonfmu.model import Finger, FingerSource, description_text, number_of, read_finger
+from tendonfmu.model import Finger, number_of, read_finger
 from tendonfmu.options import Configured, FitOptions, Options
 from tendonfmu.recordings import (
     FitRecording,
@@ -67,8 +64,8 @@ from tendonfmu.recordings import (
 
 METHODS = {"batch": (learn_batch, 60), "ekf": (learn_ekf, 2)}  # and the default of `passes`
 SIDES = {"given": None, "symmetric": False, "asymmetric": True}  # as reports say it -> `asymmetric`
-# names in reports, and of earlier versions -> options
-EARLIER = {"max_passes": "passes", "parameter_drift": "drift", "start": "resume"}
+# options whose names in reports are others
+REPORTED = {"passes": "max_passes", "drift": "parameter_drift"}
 
 
 class FitWarning(UserWarning):
@@ -82,14 +79,8 @@ class FrictionFit(Configured):
     ----------
     finger
         Description: its file, parsed JSON, or the result of `read_finger`. Effects that are absent stay absent.
-    method
-        "batch", maximum likelihood; or "ekf", the extended Kalman filter of the paper.
-    progress
-        Called with each `FitProgress`; returns False to stop.
     **options
-        The options of `tendonfmu.fit`, with the same names and defaults, and `threads` (0: all cores). `sides`
-        ("given", "symmetric" or "asymmetric"), `max_passes`, `parameter_drift` and `start` are earlier names of
-        `asymmetric`, `passes`, `drift` and `resume`.
+        The options of `tendonfmu.fit`, with the same names and defaults, and `threads` (0: all cores).
 
     Attributes
     ----------
@@ -98,7 +89,7 @@ class FrictionFit(Configured):
     parameters_, standard_errors_, covariance_
         Estimated numbers and standard errors by path, and [p, p] their covariance, in the units of the description.
     finished_, unfinished_
-        Whether `fit` reached its end, and the state of an interrupted fit, else None.
+        Whether `fit` reached its end, and the finger with the best estimate so far of an interrupted fit, else None.
     converged_, n_iter_, cost_
         Whether it converged, after how many iterations, and the negative log likelihood with the prior.
     unknowns_, z_, z_covariance_
@@ -106,27 +97,7 @@ class FrictionFit(Configured):
     """
 
     Options: ClassVar[type[Options]] = FrictionFitOptions
-    EARLIER: ClassVar[Mapping[str, str]] = EARLIER
     options: FrictionFitOptions
-
-    def __init__(
-        self,
-        finger: FingerSource,
-        method: str = "batch",
-        *,
-        progress: Callable[[Any], bool | None] | None = None,
-        **options: Any,
-    ) -> None:
-        super().__init__(finger, progress=progress, method=method, **_with_present_names(options))
-
-    @property
-    def sides(self) -> str:
-        """The option `asymmetric` as earlier versions and reports say it."""
-        return _sides(self.options)
-
-    def set_params(self, **params: Any) -> FrictionFit:
-        """Set constructor arguments by name and return the object itself."""
-        return super().set_params(**_with_present_names(params))
 
     # --- fit ----------------------------------------------------------------------------------------------------------
 
@@ -156,7 +127,7 @@ class FrictionFit(Configured):
         """
         options = self.options
         self.finished_ = False
-        self.unfinished_: Unfinished | None = None
+        self.unfinished_: Finger | None = None
         finger = read_finger(self.finger)
         given, compared_with = listed_sources(recordings), listed_sources(compare)
         check_given_once(given, compared_with)
@@ -215,19 +186,15 @@ class FrictionFit(Configured):
         settings = replace(
             settings_of(self.start_.data, self.recordings_, passes=options.passes or passes),
             options=options,
-            effective=options.effective_samples,
             previous=previous,
         )
-        start = None if options.resume is None else partial(resumed_start, Path(options.resume))
         self.remembered_: Remembered | None = None
         try:
             if options.method == "batch" and self.structure_.needs_runs:
-                self.remembered_ = learn_remembered(
-                    self.structure_, self._choice, self.recordings_, watch, settings, start
-                )
+                self.remembered_ = learn_remembered(self.structure_, self._choice, self.recordings_, watch, settings)
                 self.structure_, learned = self.remembered_.structure, self.remembered_.learned
             else:
-                learned = learn(self.structure_, self.recordings_, watch, settings, start)
+                learned = learn(self.structure_, self.recordings_, watch, settings)
         except Interrupted as stopped:
             self.unfinished_ = self._unfinished(stopped)
             if stopped.by_user:
@@ -236,20 +203,11 @@ class FrictionFit(Configured):
         self.seconds_ = perf_counter() - begin
         return learned
 
-    def _unfinished(self, stopped: Interrupted) -> Unfinished:
-        fitted = with_values(self.structure_, np.asarray(stopped.estimator.values(stopped.z)))
-        return Unfinished(
-            finger=fitted.name,
-            method=self.options.method,
-            z=stopped.z,
-            unknowns=unknown_names(stopped.estimator),
-            cost=stopped.cost,
-            options=_reported(self.options),
-            description=fitted.data,
-        )
+    def _unfinished(self, stopped: Interrupted) -> Finger:
+        return with_values(self.structure_, stopped.estimator.values(stopped.z))
 
     def _evaluated(self, learned: Learned) -> list[Evaluation]:
-        self.description_ = with_values(self.structure_, np.asarray(learned.estimator.values(learned.z)))
+        self.description_ = learned.fitted(self.structure_)
         start, fitted = self.start_.data, self.description_.data
         return [evaluate(start, fitted, recording) for recording in self.recordings_]
 
@@ -344,26 +302,11 @@ class FrictionFit(Configured):
             ],
         )
 
-    def description_text(self) -> str:
-        """Return the fitted description as JSON, as `tendonfmu fit -o` writes it."""
-        self._require_fitted()
-        return description_text(self.description_.data)
-
 
 def _with_routing(given: Finger, sources: Sequence[RecordingSource]) -> tuple[Finger, RoutingEntry]:
     """Return the finger with the routing that the recordings show, and what the report says of it."""
     learned = require_routing(given, read_recordings(sources))
     return routed(given, learned)[0], routing_entry(given, learned)
-
-
-def _with_present_names(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Return options with the names of `FitOptions` in place of earlier ones."""
-    present = {EARLIER.get(name, name): value for name, value in options.items() if name != "sides"}
-    if "sides" in options:
-        if options["sides"] not in SIDES:
-            raise InputError(f"sides: {options['sides']!r}; expected {', '.join(SIDES)}")
-        present["asymmetric"] = SIDES[options["sides"]]
-    return present
 
 
 def _sides(options: FitOptions) -> str:
@@ -372,10 +315,9 @@ def _sides(options: FitOptions) -> str:
 
 def _reported(options: FitOptions) -> dict[str, Any]:
     """Return the options that shape the result, with their names in reports."""
-    names = {present: reported for reported, present in EARLIER.items()}
     values = {each.name: getattr(options, each.name) for each in fields(FitOptions)}
     del values["asymmetric"], values["progress"]
-    reported = {names.get(name, name): value for name, value in values.items()}
+    reported = {REPORTED.get(name, name): value for name, value in values.items()}
     paths = {name: os.fspath(value) for name, value in reported.items() if isinstance(value, os.PathLike)}
     return {**reported, **paths, "sides": _sides(options)}
 

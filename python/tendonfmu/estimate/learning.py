@@ -11,7 +11,8 @@ from tendonfmu.arrays import Data, Flags, Numbers
 from tendonfmu.estimate.estimation import Estimator
 from tendonfmu.estimate.files import PreviousFit
 from tendonfmu.estimate.memory_fit import MemoryProblem, Minimum
-from tendonfmu.model import number_of
+from tendonfmu.estimate.structure import Structure, with_values
+from tendonfmu.model import Finger, number_of
 from tendonfmu.options import FitOptions, Number, option
 from tendonfmu.recordings import FitRecording
 
@@ -29,7 +30,6 @@ class Settings:
 
     options: FrictionFitOptions
     passes: int  # most passes over the data
-    effective: bool = True  # whether samples count for their share of an effective number
     previous: PreviousFit | None = None  # previous fit that the start of the structure comes from, or None
     noise: float = 0.0  # torque noise of the description (N·m)
     torque: float = 0.0  # rms of the torque to explain (N·m)
@@ -73,6 +73,10 @@ class Learned:
     innovations: list[Numbers] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)  # sentences
     memory: MemoryEvidence | None = None  # if friction remembers: then the estimator has no derivatives
+
+    def fitted(self, structure: Structure) -> Finger:
+        """Return the finger with the estimate."""
+        return with_values(structure, self.estimator.values(self.z))
 
 
 class Interrupted(Exception):

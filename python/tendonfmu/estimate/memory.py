@@ -11,7 +11,7 @@ from itertools import product
 from typing import Any
 
 from tendonfmu.arrays import Data
-from tendonfmu.model import extension_rows
+from tendonfmu.model import extension_rows, get_number, own_copy, steps_of
 
 PRESLIDING, CORDS = "presliding", "cord_stretch"
 TIMES = (1.0, 0.005)  # s, of a relaxation: cables creep for seconds, contacts of a soft constraint for milliseconds
@@ -49,13 +49,13 @@ def with_rows(data: Data, *rows: Mapping[str, Any]) -> dict[str, Any]:
 
 def without_time(data: Data, path: str) -> dict[str, Any]:
     """Return the description without one relaxation time, by its path, or without the stretch of cords."""
-    index = int(path.partition("[")[2].partition("]")[0])
-    rows = [dict(row) for row in extension_rows(data)]
-    if rows[index - 1]["effect"] == CORDS:
-        del rows[index - 1]
+    bare = own_copy(data)
+    _, index, key = steps_of(path)
+    if _is_cord(data, path):
+        del bare["extensions"][index]
     else:
-        del rows[index - 1][path.rpartition(".")[2]]
-    return {**data, "extensions": rows}
+        del bare["extensions"][index][key]
+    return bare
 
 
 def starts(data: Data) -> Iterator[dict[str, float]]:
@@ -78,7 +78,7 @@ def starts(data: Data) -> Iterator[dict[str, float]]:
 
 def memory_values(data: Data) -> dict[str, float]:
     """Return the numbers of the memory by path."""
-    return {path: _number(data, path) for path in memory_paths(data)}
+    return {path: float(get_number(data, path)) for path in memory_paths(data)}
 
 
 def optional_paths(data: Data) -> list[str]:
@@ -87,9 +87,4 @@ def optional_paths(data: Data) -> list[str]:
 
 
 def _is_cord(data: Data, path: str) -> bool:
-    return bool(extension_rows(data)[int(path.partition("[")[2].partition("]")[0]) - 1]["effect"] == CORDS)
-
-
-def _number(data: Data, path: str) -> float:
-    row = extension_rows(data)[int(path.partition("[")[2].partition("]")[0]) - 1]
-    return float(row[path.rpartition(".")[2]])
+    return bool(get_number(data, path.rpartition(".")[0])["effect"] == CORDS)

@@ -32,9 +32,9 @@ from tendonfmu.estimate.memory import (
 )
 from tendonfmu.estimate.memory_fit import MemoryProblem, Minimum, minimise
 from tendonfmu.estimate.memory_methods import STEP, coarse_problem, from_starts, full_problem, guess_prior, no_show
-from tendonfmu.estimate.methods import Start, learn_batch
-from tendonfmu.estimate.structure import Choice, Structure, build_structure, model_alone, with_values
-from tendonfmu.model import Finger, effects, finger_from_data, moment_arms, native, number_of
+from tendonfmu.estimate.methods import learn_batch
+from tendonfmu.estimate.structure import Choice, Structure, build_structure, with_values
+from tendonfmu.model import Finger, effects, moment_arms, native, number_of
 from tendonfmu.recordings import FitRecording, best_angles, make_grid
 
 Rows = tuple[dict[str, Any], ...]
@@ -139,13 +139,12 @@ class _Search:
     def _structure(self, rows: Rows) -> tuple[Structure, Estimator]:
         data = with_rows(self._finger.data, *rows)
         choice = replace(self._choice, share=(*self._choice.share, *_shared(rows)))
-        structure = build_structure(finger_from_data(data, self._finger.path), choice)
+        structure = build_structure(self._finger.with_data(data), choice)
         return structure, Estimator(structure.start.image, structure.group, structure.scale)
 
     def _numbers_of(self, estimator: Estimator, data: Data) -> Numbers:
         """Return the unknowns z [u] of a description of the same structure."""
-        bare = finger_from_data(model_alone(data), self._finger.path)
-        return estimator.unknown_values(native.Instance(bare.image).values())
+        return estimator.unknown_values(native.Instance(self._finger.with_data(data).model.image).values())
 
 
 def held_out_errors(problem: MemoryProblem, found: Minimum, variance: Numbers) -> Numbers:
@@ -299,17 +298,16 @@ def learn_remembered(
     recordings: Sequence[FitRecording],
     watch: Watch,
     settings: Settings,
-    start: Start | None,
 ) -> Remembered:
     """Fit a structure with presliding. Raises Interrupted."""
     best = best_angles(structure.start.data, recordings)
-    learn = partial(_with_what_shows, structure, choice, watch=watch, settings=settings, start=start)
+    learn = partial(_with_what_shows, structure, choice, watch=watch, settings=settings)
     found, learned, gone = learn(best.recordings)
-    data = _fitted(found, learned)
+    data = learned.fitted(found).data
     source, left, delivered = best.source, left_without_bias(data, best.recordings), left_without_bias(data, recordings)
     if np.sum(delivered**2) > MUCH**2 * np.sum(left**2):
         others = learn(recordings)
-        again = left_without_bias(_fitted(*others[:2]), recordings)
+        again = left_without_bias(others[1].fitted(others[0]).data, recordings)
         if np.sum(again**2) < np.sum(delivered**2):
             found, learned, gone = others
             source, left, delivered = "the delivered source", again, again
@@ -323,22 +321,15 @@ def _with_what_shows(
     *,
     watch: Watch,
     settings: Settings,
-    start: Start | None,
 ) -> tuple[Structure, Learned, list[str]]:
     """Fit, and fit again without what the motion does not show."""
-    learned, gone = learn_batch(structure, recordings, watch, settings, start), []
+    learned, gone = learn_batch(structure, recordings, watch, settings), []
     while path := _not_shown(structure, learned):
-        fitted = with_values(structure, np.asarray(learned.estimator.values(learned.z)))
         values = dict(zip(unknown_names(learned.estimator), learned.z.tolist(), strict=True))
         gone.append(path)
-        data = without_time(structure.start.data, path)
-        structure = build_structure(finger_from_data(data, fitted.path), choice)
-        learned = learn_batch(structure, recordings, watch, replace(settings, near=True), _start_at(values))
+        structure = build_structure(structure.start.with_data(without_time(structure.start.data, path)), choice)
+        learned = learn_batch(structure, recordings, watch, replace(settings, near=True), values)
     return structure, learned, gone
-
-
-def _start_at(values: dict[str, float]) -> Start:
-    return lambda names: np.array([values[name] for name in names])
 
 
 def _not_shown(structure: Structure, learned: Learned) -> str | None:
@@ -350,10 +341,6 @@ def _not_shown(structure: Structure, learned: Learned) -> str | None:
     costs = {path: problem.without(state, path) for path in paths}
     least = min(costs, key=costs.__getitem__, default=None)
     return least if least is not None and costs[least] < state.cost + SHOWN else None
-
-
-def _fitted(structure: Structure, learned: Learned) -> Data:
-    return with_values(structure, np.asarray(learned.estimator.values(learned.z))).data
 
 
 def left_without_bias(data: Data, recordings: Sequence[FitRecording]) -> Numbers:

@@ -244,7 +244,7 @@ def _weighted(
     """
     prior, grid = coordinate_prior(problem, settings), problem.runs.grid
     given, shares = settings.options.prior, [np.ones(problem.runs.joints)] * len(grid.segments)
-    if settings.effective:
+    if settings.options.effective_samples:
         problem.blocks, shares = effective_blocks(problem, first)
     problem.reweighted(first)
     if given is None:

@@ -11,7 +11,7 @@ are more strongly correlated.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -35,12 +35,12 @@ from tendonfmu.estimate.learning import (
 )
 from tendonfmu.estimate.memory import has_memory
 from tendonfmu.estimate.memory_methods import learn_with_memory, learned_with_memory_at, stroke_time
-from tendonfmu.estimate.structure import Structure, with_values
+from tendonfmu.estimate.structure import Structure
 from tendonfmu.files import counted
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import sample_weights
 
-Start = Callable[[Sequence[str]], Numbers]
+Start = Mapping[str, float]  # unknowns by name
 
 
 def _estimator(structure: Structure, recordings: Sequence[FitRecording]) -> Estimator:
@@ -52,12 +52,6 @@ def _estimator(structure: Structure, recordings: Sequence[FitRecording]) -> Esti
         return Estimator(image, structure.group, structure.scale)
     except EstimationError as refused:
         raise InputError(f"{structure.start.path}: {refused}") from None
-
-
-def _starting_point(estimator: Estimator, start: Start | None) -> Numbers:
-    if start is None:
-        return estimator.start
-    return _within(estimator, start(unknown_names(estimator)))
 
 
 def _rows(recording: FitRecording, part: slice) -> dict[str, Any]:
@@ -105,11 +99,17 @@ def _measured_weights(
 
 
 def learn_batch(
-    structure: Structure, recordings: Sequence[FitRecording], watch: Watch, settings: Settings, start: Start | None
+    structure: Structure,
+    recordings: Sequence[FitRecording],
+    watch: Watch,
+    settings: Settings,
+    start: Start | None = None,
 ) -> Learned:
-    """Estimate by maximum likelihood. start: [u]."""
+    """Estimate by maximum likelihood."""
     estimator = _estimator(structure, recordings)
-    begin = _starting_point(estimator, start)
+    begin = estimator.start
+    if start is not None:
+        begin = _within(estimator, np.array([start[name] for name in unknown_names(estimator)]))
     if structure.needs_runs:
         return learn_with_memory(structure, estimator, recordings, watch, settings, begin)
     added = _add_recordings(estimator, recordings)
@@ -119,7 +119,7 @@ def learn_batch(
     result = _fitted(estimator, begin, covariance, settings, watch, "")
     steps, passes = result.steps, result.passes
     weights = [np.ones_like(recording.target) for recording in recordings]
-    if settings.effective:
+    if settings.options.effective_samples:
         weights = _measured_weights(estimator, result.z, recordings, added, settings)
     is_coloured = any((each < 1).any() for each in weights)
     if is_coloured:
@@ -205,9 +205,7 @@ def _fitted(
     return result
 
 
-def learn_ekf(
-    structure: Structure, recordings: Sequence[FitRecording], watch: Watch, settings: Settings, start: Start | None
-) -> Learned:
+def learn_ekf(structure: Structure, recordings: Sequence[FitRecording], watch: Watch, settings: Settings) -> Learned:
     """Estimate by the extended Kalman filter over all recordings in order. Raises Interrupted."""
     if structure.needs_runs:
         what = "presliding" if has_memory(structure.start.data) else "a number of an extension"
@@ -216,7 +214,7 @@ def learn_ekf(
             f"{'a description without presliding' if has_memory(structure.start.data) else '--fix extensions*'}"
         )
     estimator = _estimator(structure, recordings)
-    learner = _learner(structure, estimator, settings, start)
+    learner = _learner(structure, settings)
     innovations: list[Numbers] = []
     for number in range(1, settings.passes + 1):
         if number > 1:
@@ -228,14 +226,13 @@ def learn_ekf(
     plain = np.diag(1 / (begun * np.array([unknown.scale for unknown in learner.unknowns])) ** 2)
     information = np.asarray(np.linalg.inv(covariance) - plain, dtype=np.float64)
     weights = [np.ones_like(recording.target) for recording in recordings]
-    if settings.effective and settings.options.drift == 0:
+    if settings.options.effective_samples and settings.options.drift == 0:
         weights = _common_weight(estimator, z, recordings, settings)
     share = float(weights[0][0, 0])
     if share < 1 or settings.previous is not None or (given is None and settings.options.drift == 0):
-        # information of the data alone about the prior's mean; a resumed filter started elsewhere
-        first = np.array([unknown.start for unknown in learner.unknowns])
-        mean = first if settings.previous is None else estimator.start
-        pull = share * (np.linalg.solve(covariance, z - first) + information @ (first - mean))
+        # information of the data alone
+        mean = estimator.start
+        pull = np.asarray(share * np.linalg.solve(covariance, z - mean), dtype=np.float64)
         information = share * information
         about = most_likely(information, pull, prior) if given is None else prior.of_spread(given)
         found = np.asarray(np.linalg.inv(information + inverse(about)), dtype=np.float64)
@@ -300,15 +297,15 @@ def _filter_once(
     return innovations
 
 
-def _learner(structure: Structure, estimator: Estimator, settings: Settings, start: Start | None) -> Learner:
-    """Build the filter. It starts from the description, or from an interrupted fit with the original scale."""
-    image, scale = structure.start.image, structure.scale
-    if start is not None:
-        own = np.abs(estimator.values(estimator.start))
-        scale = np.where(np.isnan(scale), own, scale)
-        image = with_values(structure, estimator.values(_starting_point(estimator, start))).image
+def _learner(structure: Structure, settings: Settings) -> Learner:
     try:
         prior = GUESS if settings.options.prior is None else settings.options.prior
-        return Learner(image, structure.group, scale, prior_std=prior, parameter_drift=settings.options.drift)
+        return Learner(
+            structure.start.image,
+            structure.group,
+            structure.scale,
+            prior_std=prior,
+            parameter_drift=settings.options.drift,
+        )
     except EstimationError as refused:
         raise InputError(f"{structure.start.path}: {refused}") from None

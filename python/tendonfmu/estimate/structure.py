@@ -6,7 +6,6 @@ literal. It matches a number, or a part of the description and thus all numbers 
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -19,7 +18,17 @@ from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError, own_fault
 from tendonfmu.estimate.fisher_information import Unknown, unknowns
 from tendonfmu.estimate.memory import has_memory
-from tendonfmu.model import LEFT_OUT, Finger, effects, finger_from_data, law_path, native, sides, steps_of
+from tendonfmu.model import (
+    DETECTING,
+    LEFT_OUT,
+    Finger,
+    effects,
+    get_number,
+    law_path,
+    own_copy,
+    set_number,
+    sides,
+)
 
 MAGNITUDES = ("static", "coulomb", "stribeck_velocity", "viscous")
 FIXED = -1
@@ -28,7 +37,6 @@ DIGITS = 10  # of a fitted number: far finer than any standard error, and static
 
 # effects whose numbers scale the measured torque: the error of a fit would be least with no torque at all
 SCALING = ("force_gain", "moment_arm", "moment_arm_variation", "pulley_eccentricity")
-BESIDE = ("sensor_fault", "estimated", "contact")  # what no fit changes
 
 
 @dataclass(frozen=True)
@@ -73,35 +81,28 @@ def build_structure(finger: Finger, choice: Choice) -> Structure:
         [finger.numbered(text) for text in texts] for texts in (choice.only, choice.fix, choice.share, choice.scale)
     )
     choice = Choice(choice.sides, only, fix, share, scale)
-    data = model_alone(with_sides(finger.data, choice.sides))
+    data = with_sides(finger.model.data, choice.sides)
     numbers = estimable_numbers(data)
     if not numbers:
         raise InputError(f"{finger.path}: nothing to estimate: no friction, cover or extension; expected at least one")
     chosen = _chosen(numbers, choice)
     owners = _owners(chosen, data, choice.share)
     data = _with_equal_values(data, chosen, owners)
-    start = described(finger, data)
-    paths = [parameter.path for parameter in native.Instance(start.image).parameters()]
-    index = {path: k for k, path in enumerate(paths)}
-    group = np.full(len(paths), FIXED, dtype=np.int32)
+    start = finger.with_data(data)
+    index = {path: k for k, path in enumerate(start.numbers)}
+    group = np.full(len(index), FIXED, dtype=np.int32)
     for number, owner in zip(chosen, owners, strict=True):
         group[index[number.path]] = owner
         if number.with_path is not None:
             group[index[number.with_path]] = owner
     return Structure(
         start=start,
-        beside={key: finger.data[key] for key in BESIDE if finger.data.get(key) is not None},
+        beside={key: finger.data[key] for key in DETECTING if finger.data.get(key) is not None},
         numbers=_numbered(start, chosen),
         group=group,
-        scale=_scales(paths, chosen, choice.scale),
+        scale=_scales(index, chosen, choice.scale),
         index=index,
     )
-
-
-def model_alone(data: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Remove `estimated`, and what asks for more signals than friction does."""
-    contact = {key: value for key, value in data["contact"].items() if key != "watches_motors"}
-    return {**{key: value for key, value in data.items() if key not in BESIDE}, "contact": contact}
 
 
 def values_of(structure: Structure, finger: Finger) -> list[Unknown]:
@@ -121,22 +122,9 @@ def _numbered(finger: Finger, numbers: Sequence[Unknown]) -> list[Unknown]:
     ]
 
 
-def own_copy(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Copy a description so that no two laws are the same object, as in JSON data built by a program."""
-    copied: dict[str, Any] = json.loads(json.dumps(data))
-    return copied
-
-
 def estimable_numbers(data: Mapping[str, Any]) -> list[Unknown]:
     """List the numbers that a fit of a parsed description may estimate: all present, `bias.initial_torque` last."""
     return [*unknowns(data), *_initial_torques(data)]
-
-
-def described(finger: Finger, data: Mapping[str, Any]) -> Finger:
-    """Return the finger with another description, checked by the core."""
-    if data is finger.data or data == finger.data:
-        return finger
-    return finger_from_data(data, finger.path)
 
 
 def _initial_torques(data: Mapping[str, Any]) -> list[Unknown]:
@@ -164,7 +152,7 @@ def with_values(structure: Structure, values: Numbers) -> Finger:
             set_number(data, number.path, get_number(data, f"{law}.static"))
     data |= structure.beside
     with own_fault("the fitted description"):  # a fit keeps within every bound
-        return finger_from_data(data, structure.start.path)
+        return structure.start.with_data(data)
 
 
 # --- sides of laws ----------------------------------------------------------------------------------------------------
@@ -244,8 +232,8 @@ def _chosen(numbers: list[Unknown], choice: Choice) -> list[Unknown]:
     return chosen
 
 
-def _scales(paths: list[str], chosen: Sequence[Unknown], given: Sequence[str]) -> NDArray[np.float64]:
-    scale = np.full(len(paths), np.nan)
+def _scales(index: Mapping[str, int], chosen: Sequence[Unknown], given: Sequence[str]) -> NDArray[np.float64]:
+    scale = np.full(len(index), np.nan)
     for text in given:
         pattern, _, number = text.rpartition("=")
         try:
@@ -255,9 +243,7 @@ def _scales(paths: list[str], chosen: Sequence[Unknown], given: Sequence[str]) -
         if not pattern or not 0 < value < np.inf:
             raise InputError(f"--scale {text}: expected PATTERN=VALUE with a value above 0, in the description's unit")
         hits = _select(chosen, [pattern], "--scale")
-        for k, path in enumerate(paths):
-            if path in hits:
-                scale[k] = value
+        scale[[index[path] for path in hits]] = value
     return scale
 
 
@@ -345,14 +331,6 @@ def _with_equal_values(data: Mapping[str, Any], numbers: Sequence[Unknown], owne
     return result
 
 
-def set_number(data: Any, path: str, value: float) -> None:
-    """Set a number of a parsed description in place."""
-    *way, last = steps_of(path)
-    for step in way:
-        data = data[step]
-    data[last] = value
-
-
 def _value(data: Any, path: str) -> float:
     """Return a number; if an extension leaves it out, the value that the core assumes."""
     try:
@@ -361,10 +339,3 @@ def _value(data: Any, path: str) -> float:
         if not path.startswith("extensions["):
             raise
         return LEFT_OUT.get(path.rpartition(".")[2], 0.0)
-
-
-def get_number(data: Any, path: str) -> Any:
-    """Return a number of a parsed description."""
-    for step in steps_of(path):
-        data = data[step]
-    return data

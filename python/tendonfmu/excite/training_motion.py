@@ -5,7 +5,6 @@ This module computes and does not print.
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -19,11 +18,10 @@ from tendonfmu import estimate
 from tendonfmu.arrays import Data, Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.excite.excitation import SLOW, Excitation, Plan, Stroke, Variation, plan_excitation
-from tendonfmu.files import counted
-from tendonfmu.model import Finger, balanced_forces, native, pretension_vector, read_finger
+from tendonfmu.model import Finger, balanced_forces, pretension_vector, read_finger
 from tendonfmu.options import ExciteOptions
+from tendonfmu.simulate import finger_with_limits, is_rig
 
-RIG_FORMAT = "tendonfmu-rig-1"
 DEFAULT_PRETENSION = 10.0  # N
 STRONGEST = 1e6  # N
 MARGIN = 0.05  # of a rig's range between limits, left out at either end
@@ -81,38 +79,11 @@ class ExciteResult:
 
 def read_subject(path: Path) -> Subject:
     """Read a finger description or a rig."""
-    try:
-        data = json.loads(path.read_bytes())
-    except (OSError, ValueError):
-        return Subject(read_finger(path), None)  # raises the error
-    if not isinstance(data, dict) or data.get("format") != RIG_FORMAT:
+    if not is_rig(path):
         return Subject(read_finger(path), None)
-    finger: Any = data.get("finger")
-    if isinstance(finger, str):
-        described = read_finger(path.parent / finger)
-    else:
-        try:
-            native.image_from_json(json.dumps(finger).encode())
-        except native.NativeError as refused:
-            raise InputError(f"{path}: finger: {refused}") from None
-        described = Finger(path, finger)
-    return Subject(described, _limits(path, data, len(described.joint_names)))
-
-
-def _limits(path: Path, data: Data, joints: int) -> list[tuple[float, float]] | None:
-    links = (data.get("physics") or {}).get("links") or []
-    if len(links) != joints:
-        raise InputError(f"{path}: physics.links: {counted(len(links), 'link')}; expected one per joint, {joints}")
-    limits = []
-    for k, link in enumerate(links, start=1):
-        try:
-            low, high = float(link["limits"]["lower"]), float(link["limits"]["upper"])
-        except (KeyError, TypeError, ValueError):
-            return None  # limits are optional in a rig
-        if not low < high:
-            raise InputError(f"{path}: physics.links[{k}].limits: {low:g} to {high:g} rad; expected lower < upper")
-        limits.append((low, high))
-    return limits
+    finger, joints = finger_with_limits(path)
+    limits = list(zip(joints.lower, joints.upper, strict=True))
+    return Subject(finger, limits if np.isfinite(limits).all() else None)  # limits are optional in a rig
 
 
 # --- ranges -----------------------------------------------------------------------------------------------------------

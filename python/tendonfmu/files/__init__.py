@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from .json_node import Node, Refusal, finite, read_json, report_text
+    from .json_node import Node, Refusal, finite, format_of, read_json, report_text
     from .stand_in import StandIn, path_of
     from .tables import (
         FORMATS,

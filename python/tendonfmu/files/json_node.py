@@ -50,6 +50,15 @@ def read_json(path: Path, what: str) -> Any:
         raise InputError(f"{path}: nested too deeply; expected {what} (JSON)") from None
 
 
+def format_of(path: Path) -> str:
+    """Return the format that a JSON file claims to have, even an invalid one; "" if there is none."""
+    try:
+        data = json.loads(path.read_bytes())
+    except (OSError, ValueError, RecursionError):
+        return ""
+    return str(data.get("format", "")) if isinstance(data, dict) else ""
+
+
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for key, value in pairs:

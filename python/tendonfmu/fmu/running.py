@@ -38,7 +38,7 @@ def finger_of(model: Path) -> models.Finger | None:
     except KeyError:
         return None
     except (OSError, zipfile.BadZipFile) as wrong:
-        raise InputError(f"{model}: cannot be read ({wrong}); expected an FMU") from None
+        raise InputError(f"{model}: not an FMU ({wrong}); expected FINGER.json or FINGER.fmu") from None
     return models.finger_from_text(model, text)
 
 
@@ -95,10 +95,8 @@ def _run_native(finger: models.Finger, recording: Recording, source: int) -> Out
     if source not in (1, 2, 3):
         raise InputError(f"kinematics = {source!r}: expected 1, 2 or 3")
     recording.require(finger.joints, finger.tendons, models.inputs_used(source, models.watches_motors(finger.data)))
-    try:
+    with models.native.refusals_of(recording.path):
         results = models.native.Instance(finger.image, source).run(recording.arrays())
-    except models.native.NativeError as refused:
-        raise InputError(f"{recording.path}: {refused}") from None
     names = (*models.NUMBERS, *models.OPTIONAL_NUMBERS, *models.FLAGS, *models.PLACE, *models.SENSORS)
     outputs = {name: results[name] for name in names if name in results}
     return {"time": recording.time, **outputs}

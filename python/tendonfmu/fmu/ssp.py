@@ -120,12 +120,12 @@ def write_parameter_set(
 
 
 def _parameter_set(name: str, parameters: Sequence[SetParameter], finger: Finger, warnings: Sequence[str]) -> bytes:
-    units = {given.path: given.unit for given in native.Instance(finger.image).parameters()}
+    units = {given.path: finger.numbers[given.path].unit for given in parameters}
     table = read_table(package_file("model_description/variables.json").read_text(encoding="utf-8"))
     base_units: Mapping[str, Mapping[str, Any]] = table.data["units"]
-    known = {given.path: {"unit": units[given.path]} if units[given.path] in base_units else {} for given in parameters}
+    known = {path: {"unit": unit} if unit in base_units else {} for path, unit in units.items()}
     content = [SSV.Parameters(*(_parameter(given, known[given.path]) for given in parameters))]
-    if used := sorted(base_units.keys() & {units[given.path] for given in parameters}):
+    if used := sorted(base_units.keys() & set(units.values())):
         exponents = ({key: str(value) for key, value in base_units[unit].items()} for unit in used)
         defined = (SSC.Unit(SSC.BaseUnit(each), name=unit) for unit, each in zip(used, exponents, strict=True))
         content.append(SSV.Units(*defined))
@@ -156,22 +156,19 @@ def read_parameter_set(path: Path, finger: Finger) -> dict[str, float]:
         raise InputError(f"{path}: {wrong}; expected a parameter set of SSP (.ssv)") from None
     if root.tag != f"{_SSV}ParameterSet":
         raise InputError(f"{path}: element {root.tag}; expected a parameter set of SSP (.ssv)")
-    known = {parameter.path: parameter.unit for parameter in native.Instance(finger.image).parameters()}
     values: dict[str, float] = {}
     for name, value, unit in _entries(path, root):
-        if name not in known:
+        if name not in finger.numbers:
             raise InputError(f"{path}: {name}: not a parameter of {finger.path.name}; expected names of its FMU")
-        if unit not in (None, known[name]):
-            raise InputError(f"{path}: {name}: unit {unit}; expected {known[name]}")
+        if unit not in (None, finger.numbers[name].unit):
+            raise InputError(f"{path}: {name}: unit {unit}; expected {finger.numbers[name].unit}")
         if name in values:
             raise InputError(f"{path}: {name}: given twice; expected each parameter once")
         values[name] = value
     if not values:
         raise InputError(f"{path}: no parameters; expected at least one")
-    try:
+    with native.refusals_of(path):
         native.Instance(finger.image).set(values)
-    except native.NativeError as refused:
-        raise InputError(f"{path}: {refused}") from None
     return values
 
 

@@ -31,7 +31,7 @@ from tendonfmu.mjcf.finger_parts import (
     sampled_angles,
     stiffness_of,
 )
-from tendonfmu.model import NativeError, native
+from tendonfmu.model import native
 
 FORMAT = "tendonfmu-finger-1"
 UNLIMITED = 1.0  # rad (m); range on both sides of the reference of a joint without limits
@@ -66,11 +66,6 @@ class ImportedFinger:
     notes: list[str]  # where numbers come from that the model has in another form
     warnings: list[str]  # what the description has less exactly than the model, with figures
     left_out: list[str]  # what of these joints and tendons the description does not have
-
-    @property
-    def text(self) -> str:
-        """The description as JSON."""
-        return json.dumps(self.data, indent=2, ensure_ascii=False) + "\n"
 
     def report(self, model: Path, output: Path) -> dict[str, Any]:
         """Return what was done, for `--json`. output: the file of the description."""
@@ -334,10 +329,8 @@ def _weight(
 
 
 def _check_accepted(model: CompiledModel, data: Mapping[str, Any]) -> None:
-    try:
+    with native.refusals_of(f"{model.path}: these joints and tendons do not make a valid finger"):
         native.image_from_json(json.dumps(data))
-    except NativeError as refused:
-        raise InputError(f"{model.path}: these joints and tendons do not make a valid finger: {refused}") from None
 
 
 # --- what a description does not have ---------------------------------------------------------------------------------

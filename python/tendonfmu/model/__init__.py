@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     )
     from .description_numbers import (
         DEFAULTS,
+        DETECTING,
         EFFECT_NUMBERS,
         LEFT_OUT,
         LIMITS,
@@ -35,14 +36,17 @@ if TYPE_CHECKING:
         extended_row,
         extension_numbers,
         extension_rows,
+        get_number,
         law_path,
         number_of,
+        own_copy,
         part_of,
         place_of,
+        set_number,
         steps_of,
+        without_detection,
     )
     from .friction_places import (
-        NEVER,
         Effect,
         balanced_forces,
         effects,
@@ -52,7 +56,6 @@ if TYPE_CHECKING:
         sliding_velocity,
         tendon_positions,
         velocity_threshold,
-        without_detection,
         without_friction,
         without_learning,
         working_point_weights,

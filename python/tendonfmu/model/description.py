@@ -19,7 +19,7 @@ from typing import Any
 from tendonfmu.errors import InputError
 from tendonfmu.files import counted, path_of, write_text
 from tendonfmu.model import native
-from tendonfmu.model.description_numbers import extension_numbers, extension_rows, with_values_at
+from tendonfmu.model.description_numbers import extension_numbers, extension_rows, with_values_at, without_detection
 from tendonfmu.model.routing_geometry import finger_html
 
 IN_MEMORY = Path("finger")  # stands for the file of a finger that was read from none
@@ -62,10 +62,18 @@ class Finger:
     @cached_property
     def image(self) -> bytes:
         """The model image made from the description."""
-        try:
+        with native.refusals_of(self.path):
             return native.image_from_json(self.text)
-        except native.NativeError as refused:
-            raise InputError(f"{self.path}: {refused}") from None
+
+    @cached_property
+    def numbers(self) -> Mapping[str, native.Parameter]:
+        """All numbers of the finger by path, in the order of the FMU's parameters, with unit and range."""
+        return {each.path: each for each in native.Instance(self.image).parameters()}
+
+    @cached_property
+    def model(self) -> Finger:
+        """The friction model alone: the finger without its detector, and without how well its numbers are known."""
+        return self.with_data(without_detection(self.data))
 
     def __repr__(self) -> str:
         return f"<Finger {self.name}: {counted(self.joints, 'joint')}, {counted(self.tendons, 'tendon')}>"
@@ -137,10 +145,14 @@ class Finger:
         """
         try:
             named = {self.numbered(path) if isinstance(path, str) else path: value for path, value in values.items()}
-            data = with_values_at(self.to_dict(), _plain(named), native.Instance(self.image))
+            data = with_values_at(self.to_dict(), _plain(named), self.numbers)
         except InputError as refused:
             raise InputError(f"{self.path}: {refused}") from None
-        return finger_from_data(data, self.path)
+        return self.with_data(data)
+
+    def with_data(self, data: Mapping[str, Any]) -> Finger:
+        """Return the finger with another description, checked by the core; itself if it is the same."""
+        return self if data is self.data or data == self.data else finger_from_data(data, self.path)
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write the description as a JSON file, whole or not at all.
@@ -260,10 +272,8 @@ def finger_from_data(data: Mapping[str, Any], path: Path = IN_MEMORY) -> Finger:
 def finger_from_text(path: Path, text: bytes) -> Finger:
     """Read the text of a finger description."""
     _check_format(path, text)
-    try:
+    with native.refusals_of(path):
         image = native.image_from_json(text)
-    except native.NativeError as refused:
-        raise InputError(f"{path}: {refused}") from None
     finger = Finger(path, json.loads(text))
     vars(finger).update(text=text, image=image)  # `replace` makes a finger without them
     return finger
@@ -392,7 +402,6 @@ def count(description: Finger) -> Counts:
     """Count what a description holds."""
     data = description.data
     present = list(laws(data))
-    parameters = native.Instance(description.image).parameters()
     edges = _entries(data, "edge_friction")
     kinds = ("friction", "load_friction", "pulley_friction", "edge_friction")
     return Counts(
@@ -409,8 +418,8 @@ def count(description: Finger) -> Counts:
         asymmetric_laws=sum(1 for _, law in present if len(sides(law)) == 2),
         covers=sum(1 for joint in data["joints"] if joint.get("cover") is not None),
         extensions=[row["effect"] for row in extension_rows(data)],
-        parameters=len(parameters),
-        tunable_parameters=sum(1 for parameter in parameters if parameter.tunable),
+        parameters=len(description.numbers),
+        tunable_parameters=sum(1 for number in description.numbers.values() if number.tunable),
         estimated_numbers=estimated_numbers(data),
     )
 

@@ -11,10 +11,11 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
+from itertools import count, takewhile
 from typing import Any
 
 from tendonfmu.errors import InputError
-from tendonfmu.model.native import Instance
+from tendonfmu.model.native import Parameter
 
 # Generated from the tables in runtime/description by `python tools/tables/generate.py`; SI units.
 _TABLE = json.loads((files("tendonfmu") / "schema" / "description_numbers.json").read_text(encoding="utf-8"))
@@ -33,6 +34,8 @@ class EffectNumber:
 DEFAULTS: Mapping[str, float] = _TABLE["defaults"]  # by path
 RANGES: Mapping[str, tuple[float, float]] = {path: (least, most) for path, (least, most) in _TABLE["ranges"].items()}
 LIMITS: Mapping[str, int] = _TABLE["limits"]  # largest number of each in one description
+NEVER = 1e9  # N·m; no contact threshold is ever passed
+DETECTING = ("contact", "sensor_fault", "estimated")  # what is no part of the friction model
 # By effect, in the order of the FMU's parameters.
 EFFECT_NUMBERS: Mapping[str, Mapping[str, EffectNumber]] = {
     effect: {key: EffectNumber(**number) for key, number in numbers.items()}
@@ -102,6 +105,34 @@ def bias_is_constant(data: Mapping[str, Any]) -> bool:
     return number_of(data, "bias.drift_variance") == 0.0 and (data.get("bias") or {}).get("initial_variance") == 0.0
 
 
+def own_copy(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Copy a description so that no two laws are the same object, as in JSON data built by a program."""
+    copied: dict[str, Any] = json.loads(json.dumps(data))
+    return copied
+
+
+def get_number(data: Any, path: str) -> Any:
+    """Return a number, or another part, of a parsed description."""
+    for step in steps_of(path):
+        data = data[step]
+    return data
+
+
+def set_number(data: Any, path: str, value: float) -> None:
+    """Set a number of a parsed description in place."""
+    *way, last = steps_of(path)
+    for step in way:
+        data = data[step]
+    data[last] = value
+
+
+def without_detection(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the description of the friction model alone: nothing is detected, and nothing says what was estimated."""
+    nothing = {"threshold": [NEVER] * len(data["joints"])}  # in the place of what is given: keys keep their order
+    kept = {key: value for key, value in data.items() if key == "contact" or key not in DETECTING}
+    return {**kept, "contact": nothing}
+
+
 # --- paths ------------------------------------------------------------------------------------------------------------
 
 
@@ -152,38 +183,32 @@ def law_path(path: str) -> LawPath | None:
     )
 
 
-def with_values_at(data: dict[str, Any], values: Mapping[str, Any], instance: Instance) -> dict[str, Any]:
-    """Write values into a description, in place, and return it."""
+def with_values_at(data: dict[str, Any], values: Mapping[str, Any], numbers: Mapping[str, Parameter]) -> dict[str, Any]:
+    """Write values into a description, in place, and return it. numbers: those of the finger that it describes."""
+    joints = len(data["joints"])
     for path, value in values.items():
         if not isinstance(path, str) or not _PATH.fullmatch(path):
             raise InputError(f"{path!r}: expected a path such as tendons[1].stiffness or contact.threshold[1]")
         steps = steps_of(path)
         place: Any = data
-        for k, step in enumerate(steps[:-1]):
-            place = _entered(place, steps, k, step, instance)
-        _check_step(place, steps, len(steps) - 1, instance.joints)
+        for k in range(len(steps) - 1):
+            place = _entered(place, steps, k, numbers, joints)
+        _check_step(place, steps, len(steps) - 1, joints)
         place[steps[-1]] = value
     return data
 
 
-def _entered(place: Any, steps: Sequence[Step], k: int, step: Step, instance: Instance) -> Any:
-    """Return what is at a step. It is made if it is absent."""
-    _check_step(place, steps, k, instance.joints)
+def _entered(place: Any, steps: Sequence[Step], k: int, numbers: Mapping[str, Parameter], joints: int) -> Any:
+    """Return what is at a step. It is made if it is absent: a list is that which the model assumes."""
+    _check_step(place, steps, k, joints)
+    step = steps[k]
     found = place.get(step) if isinstance(step, str) else place[step]
     if found is None:
-        found = _assumed(_text(steps[: k + 1]), step, instance) if isinstance(steps[k + 1], int) else {}
+        found = {}
+        if isinstance(steps[k + 1], int):
+            listed = takewhile(numbers.__contains__, (f"{_text(steps[: k + 1])}[{j}]" for j in count(1)))
+            found = [None] * joints if step in _PADDED else [numbers[each].start for each in listed]
         place[step] = found
-    return found
-
-
-def _assumed(path: str, key: Step, instance: Instance) -> list[Any]:
-    """Return the list that the model assumes where the description has none."""
-    if key in _PADDED:
-        return [None] * instance.joints
-    known = {parameter.path for parameter in instance.parameters()}
-    found: list[Any] = []
-    while f"{path}[{len(found) + 1}]" in known:
-        found.append(instance.get(f"{path}[{len(found) + 1}]"))
     return found
 
 

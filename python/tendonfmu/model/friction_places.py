@@ -16,12 +16,11 @@ from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.model import native
 from tendonfmu.model.description import Law
-from tendonfmu.model.description_numbers import number_of
+from tendonfmu.model.description_numbers import number_of, without_detection
 
 LEAST_SHARE = 0.05  # of the mean; keeps every pulling tendon taut
 _SWEEPS = 20000
 _ITERATIONS = 8  # each reduces the error to the share of the force that friction takes, some percent
-NEVER = 1e9  # N·m; no contact threshold is ever passed
 
 
 @dataclass(frozen=True)
@@ -125,11 +124,6 @@ def pretension_vector(data: Mapping[str, Any]) -> Numbers:
         )
     mean = float(np.mean(shares))
     return shares / mean if mean > 1e-9 else np.zeros(len(arms))
-
-
-def without_detection(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a description without contact detection."""
-    return {**data, "contact": {"threshold": [NEVER] * len(data["joints"])}, "sensor_fault": None}
 
 
 def without_learning(data: Mapping[str, Any], *kept: str) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """How Python calls the C runtime: the binding, through which every call of the model goes.
 
 Errors are `NativeError` with the runtime's own line: what, where and what was expected. They are not `InputError`: the
-caller that passes user input to the runtime adds the name of the file.
+caller that passes user input to the runtime adds the name of the file (`refusals_of`).
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from tendonfmu import _native
 from tendonfmu.arrays import Array
+from tendonfmu.errors import InputError
 from tendonfmu.model.output_names import INPUTS
 
 
@@ -43,6 +44,15 @@ def _refusals() -> Iterator[None]:
         yield
     except ValueError as refused:
         raise NativeError(str(refused)) from None
+
+
+@contextmanager
+def refusals_of(source: object) -> Iterator[None]:
+    """Turn what the runtime refuses inside the block into an InputError that begins with its source, such as a file."""
+    try:
+        yield
+    except NativeError as refused:
+        raise InputError(f"{source}: {refused}") from None
 
 
 def version() -> str:

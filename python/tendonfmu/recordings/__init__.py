@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from .converters.column_map import read_log_format
     from .converters.inspection import Inspection, inspect_log
     from .converters.lerobot_log import LeRobotLog
-    from .converters.one_joint import describe_joint, describe_recorded_joint, description_text, joint_description
+    from .converters.one_joint import describe_joint, describe_recorded_joint, joint_description
     from .converters.proposal import (
         Proposal,
         clock_line,

@@ -21,7 +21,7 @@ import numpy as np
 
 from tendonfmu.arrays import Flags, Indices, Numbers
 from tendonfmu.errors import InputError
-from tendonfmu.model import Finger, finger_from_data
+from tendonfmu.model import Finger
 from tendonfmu.recordings.faults import gaps, still_runs
 from tendonfmu.recordings.recording import Recording
 from tendonfmu.recordings.signal_noise import FEWEST, stopped, white_noise, zero_phase
@@ -222,7 +222,7 @@ def routed(finger: Finger, learned: Sequence[TendonRouting]) -> tuple[Finger, li
         tendon |= {"zero": each.zero.rounded} if each.zero.differs else {}
     errors = {number.path: [number.rounded, float(f"{number.half / NORMAL:.4g}")] for number in moved}
     data["estimated"] = {**(data.get("estimated") or {}), **errors}
-    return finger_from_data(data, finger.path), moved
+    return finger.with_data(data), moved
 
 
 def clock_drift(learned: Sequence[TendonRouting]) -> Learned | None:

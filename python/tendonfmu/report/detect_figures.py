@@ -36,7 +36,7 @@ _HEAT = ("#FFFFFF", "#BBD9EE", draw.SKY, draw.BLUE, "#08306B")
 def write_score_figures(scored: Scored, folder: Path) -> dict[Path, str]:
     """Write the page with the figures of a score."""
     page = folder / PAGE
-    write_figures(page, "contact detection", scored.subject.finger.name, score_sheets(scored))
+    write_figures(page, "contact detection", scored.finger.name, score_sheets(scored))
     return {page: "torques and detection over time, every event, thresholds and delays"}
 
 
@@ -63,7 +63,7 @@ def contact_sheet(scored: Scored) -> draw.Sheet:
     shown = (time >= begin) & (time <= begin + SHOWN)
     rows = np.flatnonzero(shown)
     rows = rows[:: max(1, len(rows) // _POINTS)]
-    names, joints = scored.subject.finger.joint_names, _strongest(track)
+    names, joints = scored.finger.joint_names, _strongest(track)
     labelled = flagged_stretches(time, track.label & shown)
     limits = float(time[rows[0]]), float(time[rows[-1]])
 
@@ -105,7 +105,7 @@ def contact_sheet(scored: Scored) -> draw.Sheet:
             zoom="time",
         )
     )
-    return draw.Sheet("score", "contacts", f"{scored.subject.finger.name}: {track.recording.path.name}", panels)
+    return draw.Sheet("score", "contacts", f"{scored.finger.name}: {track.recording.path.name}", panels)
 
 
 def _detection(
@@ -210,7 +210,7 @@ def event_sheet(scored: Scored) -> draw.Sheet:
         x_limits=(-BEFORE, end),
         y_limits=(count - 0.5, -0.5),
     )
-    return draw.Sheet("score", "events", f"{scored.subject.finger.name}: {counted(count, 'event')}", [shown])
+    return draw.Sheet("score", "events", f"{scored.finger.name}: {counted(count, 'event')}", [shown])
 
 
 def _order(event: Event) -> tuple[int, float]:
@@ -275,7 +275,7 @@ def roc_sheet(scored: Scored, points: Sequence[RocPoint]) -> draw.Sheet:
         log_x=True,
         y_limits=(-3.0, 103.0),
     )
-    title = f"{scored.subject.finger.name}: {events}, {minutes:.3g} min of free time"
+    title = f"{scored.finger.name}: {events}, {minutes:.3g} min of free time"
     return draw.Sheet("score", "roc", title, [against, over])
 
 
@@ -317,7 +317,7 @@ def delay_sheet(scored: Scored) -> draw.Sheet:
         x_limits=(0.0, 1.03e3 * max(end, 1e-3)),
         y_limits=(0.0, top),
     )
-    title = f"{scored.subject.finger.name}: {len(delays)} of {counted(total, 'event')} found"
+    title = f"{scored.finger.name}: {len(delays)} of {counted(total, 'event')} found"
     return draw.Sheet("score", "delays", title, [shown])
 
 

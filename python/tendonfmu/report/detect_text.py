@@ -33,9 +33,9 @@ def score_tables(scored: Scored) -> Iterator[Table]:
     if summary.external_at_alarm is not None:
         headings.append("at the alarm: median\n|external|, mN·m")
         columns.append([_estimate(value, 1e3) for value in summary.external_at_alarm])
-    names = scored.subject.finger.joint_names
+    names = scored.finger.joint_names
     yield (
-        f"{scored.subject.finger.name}: torque, with 95 % intervals",
+        f"{scored.finger.name}: torque, with 95 % intervals",
         tuple(headings),
         list(zip(names, *columns, strict=True)),
     )

@@ -10,7 +10,7 @@ from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from .plant import require_plant
-    from .rig import describe_rig, description_files, is_rig, read_rig
+    from .rig import describe_rig, description_files, finger_with_limits, is_rig, read_rig
     from .simulation import simulate
     from .ssp import build_plant_fmu
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from tendonfmu.arrays import Data
 from tendonfmu.errors import InputError
-from tendonfmu.files import Node, Refusal, counted, read_json
+from tendonfmu.files import Node, Refusal, counted, format_of, read_json
 from tendonfmu.model import Finger, count, native, read_finger
 from tendonfmu.simulate.motion_plan import Joints, Motion, Segment, expand_motion, expand_pushes
 from tendonfmu.simulate.plant import Plant, refused_by
@@ -90,12 +90,7 @@ class Rig:
 
 def is_rig(path: Path) -> bool:
     """Return whether a file claims to be a rig, even an invalid one."""
-    try:
-        with path.open(encoding="utf-8") as file:
-            data = json.load(file)
-    except (OSError, ValueError, RecursionError):
-        return False
-    return isinstance(data, dict) and str(data.get("format", "")).startswith("tendonfmu-rig-")
+    return format_of(path).startswith("tendonfmu-rig-")
 
 
 def description_files(path: Path) -> list[Path]:
@@ -130,6 +125,17 @@ def read_rig(path: Path) -> Rig:
     data = _with_base(path, files, [])
     try:
         return _expand(path, files, data)
+    except Refusal as refused:
+        raise InputError(f"{path}: {refused}") from None
+
+
+def finger_with_limits(path: Path) -> tuple[Finger, Joints]:
+    """Return the finger of a rig, and the limits of its joints, whatever else the rig has. Raises InputError."""
+    files: list[Path] = []
+    root = Node(_with_base(path, files, []))
+    try:
+        finger = _finger(root.member("finger"), path, files)
+        return finger, _links(root.member("physics"), finger.joints)[1]
     except Refusal as refused:
         raise InputError(f"{path}: {refused}") from None
 

@@ -22,6 +22,6 @@ if TYPE_CHECKING:
         workers_of,
     )
     from .phases import Phases, PhaseState, Step, ended_by_signals, uninterrupted
-    from .steps import FOLDER, Steps, digest_of, digest_of_file, forget_steps
+    from .steps import FOLDER, Steps, digest_of, digest_of_arrays, forget_steps
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -1,7 +1,7 @@
 """How the steps of a long computation are kept in a folder, so that finished and unchanged steps are not repeated.
 
-A result is JSON and belongs to everything it was made from: the digest of the files, of the options, of the results
-before it, and of the version of the product.
+A result is JSON and belongs to everything it was made from: the digest of the recordings, of the options, of the
+results before it, and of the version of the product.
 """
 
 from __future__ import annotations
@@ -11,9 +11,12 @@ import json
 import shutil
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tendonfmu.files import write_text
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 FOLDER = ".steps"
 FORMAT = "tendonfmu-calibration-step-1"
@@ -70,10 +73,9 @@ def digest_of(content: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
-def digest_of_file(file: Path) -> str:
-    """Return the digest of a file."""
+def digest_of_arrays(arrays: Mapping[str, NDArray[Any]]) -> str:
+    """Return the digest of named arrays."""
     digest = hashlib.sha256()
-    with file.open("rb") as opened:
-        while piece := opened.read(1 << 20):
-            digest.update(piece)
+    for name, values in arrays.items():
+        digest.update(f"{name}{values.shape}".encode() + values.tobytes())
     return digest.hexdigest()

@@ -287,9 +287,8 @@ def calibrate_part(
 ) -> dict[str, Any]:
     """Calibrate a finger and write its folder. files: free motion, tests, pushes."""
     free, tests, pushes = files
-    calibrated = calibration.calibrate(
-        finger, free, folder, tests=tests, pushes=pushes, previous=previous, options=CalibrateOptions(**options)
-    )
+    given = CalibrateOptions(**options, test=tests, pushes=pushes, previous=previous)
+    calibrated = calibration.calibrate(finger, free, folder, given)
     calibration.write_calibration(calibrated, Path(folder))
     return {"report": calibration.REPORT}
 

@@ -16,9 +16,9 @@ from typing import Any, NamedTuple
 from tendonfmu.arrays import Data
 from tendonfmu.diagnosis.samples import Span
 from tendonfmu.errors import InputError
-from tendonfmu.estimate import MAGNITUDES, get_number, own_copy, set_number
+from tendonfmu.estimate import MAGNITUDES
 from tendonfmu.files import counted
-from tendonfmu.model import law_path
+from tendonfmu.model import get_number, law_path, own_copy, set_number
 
 # --- changes of a description -----------------------------------------------------------------------------------------
 # An absent law gets a negligible friction, because the estimator refuses a law without any. A law that is split into

@@ -30,8 +30,7 @@ from tendonfmu.diagnosis.effects.mechanism import (
     with_rows,
 )
 from tendonfmu.diagnosis.effects.places import ANGLES, largest_coulomb, law_path, laws_at
-from tendonfmu.estimate import get_number
-from tendonfmu.model import DEFAULTS, EFFECT_NUMBERS, LEFT_OUT, MAGNITUDES, velocity_threshold
+from tendonfmu.model import DEFAULTS, EFFECT_NUMBERS, LEFT_OUT, MAGNITUDES, get_number, velocity_threshold
 
 Make = Callable[[str, Data, Place, Shape], Variant]
 

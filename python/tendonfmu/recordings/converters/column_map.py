@@ -9,6 +9,7 @@ decide, a value is "?", which is refused here. docs/reference/commands/convert.m
 from __future__ import annotations
 
 import codecs
+import json
 import re
 import zoneinfo
 from collections.abc import Iterator, Mapping
@@ -137,9 +138,10 @@ class ConvertedLog:
     notes: list[str] = field(default_factory=list)  # what was left out or computed, one sentence each
 
 
-def read_map(path: Path) -> ColumnMap:
-    """Read and check MAP.json. Raise InputError with file, key and what was expected."""
-    document = read_json(path, "a map of columns")
+def read_map(source: Path | Mapping[str, Any]) -> ColumnMap:
+    """Read and check MAP.json, or its content. Raise InputError with file, key and what was expected."""
+    path = source if isinstance(source, Path) else Path("map")
+    document = read_json(path, "a map of columns") if source is path else json.loads(json.dumps(source))
     try:
         return _read(path, Node(document))
     except Refusal as refused:

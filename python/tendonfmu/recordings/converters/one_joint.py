@@ -20,7 +20,6 @@ load already contains the torque that accelerates the machine.
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -228,11 +227,6 @@ def _description(
         "contact": {"threshold": [float(f"{THRESHOLD * numbers['missed']:.4g}")]},
         "extensions": [] if known else [inertia],
     }
-
-
-def description_text(description: dict[str, Any]) -> str:
-    """Return the text of a description's file."""
-    return json.dumps(description, indent=1) + "\n"
 
 
 def slowest_motion(time: Numbers, velocity: Numbers, angle: Numbers, cutoff: float) -> float:

@@ -45,9 +45,9 @@ STEPS = (2e-6, 2.0)  # s; usual time from sample to sample
 Columns = dict[str, Numbers]  # of a recording, [N] each, in SI
 
 
-def convert_table(file: Path, map_file: Path) -> ConvertedLog:
-    """Convert a log with a map of columns."""
-    conversion = Conversion(file, map_file)
+def convert_table(file: Path, columns_of: Path | Mapping[str, Any]) -> ConvertedLog:
+    """Convert a log with a map of columns, or its file."""
+    conversion = Conversion(file, columns_of)
     blocks = list(conversion.recording())
     columns = {key: np.concatenate([block[key] for block in blocks]) for key in blocks[0]}
     return ConvertedLog(columns, conversion.map, conversion.velocity_cutoff, conversion.notes)
@@ -56,8 +56,8 @@ def convert_table(file: Path, map_file: Path) -> ConvertedLog:
 class Conversion:
     """A log that is being converted."""
 
-    def __init__(self, file: Path, map_file: Path, log: Log | None = None) -> None:
-        self.map = read_map(map_file)
+    def __init__(self, file: Path, columns_of: Path | Mapping[str, Any], log: Log | None = None) -> None:
+        self.map = read_map(columns_of)
         self.log: Log = log or open_log(file, self.map.log)
         self.notes: list[str] = []
         self.velocity_cutoff = 0.0
