@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections.abc import Sequence
 from importlib.resources import files
@@ -16,9 +17,10 @@ import pytest
 from command import Call
 from encoder_finger import EncoderFinger, encoder_finger
 from repetitions import repeated
+from tendonfmu.diagnosis.effects import Where
 from tendonfmu.diagnosis.inputs import read_input
 from tendonfmu.diagnosis.kinematic_causes import KinematicCauses, find_kinematic_causes
-from tendonfmu.diagnosis.result import Cause
+from tendonfmu.diagnosis.result import Cause, Diagnosis, Experiment
 from tendonfmu.diagnosis.tendon_equation import encoder_offsets
 from tendonfmu.files import write_table
 
@@ -99,6 +101,19 @@ def test_the_fewest_offsets_and_zeros() -> None:
     assert alone.joints.tolist() == [] and alone.single.tolist() == [False, False, True, False]
     both = encoder_offsets(-arms @ [0.0, -0.03] + [1e-3, 0.0, 0.0, 0.0], known_to, arms)
     assert both.joints.tolist() == [1] and both.single.tolist() == [True, False, False, False]
+
+
+def test_what_is_named_here_is_not_too_small_there() -> None:
+    """The search of the torque looks for some of the same effects."""
+    zero, other = Cause(Where("zero", None, 1)), Cause(Where("viscous_change", 1, None))
+    fields = dict.fromkeys((each.name for each in dataclasses.fields(Diagnosis)), ())
+    tried = Diagnosis(
+        **{**fields, "verdict": "adequate", "tested": 3, "too_small": (zero, other), "uncertain": (zero,)}
+    )
+    both = KinematicCauses(is_change=False, causes=(zero,)).in_diagnosis(
+        dataclasses.replace(tried, experiment=Experiment("Record more."), extended_data={})
+    )
+    assert (both.causes, both.too_small, both.uncertain) == ((zero,), (other,), ())
 
 
 def test_too_many_columns_are_refused(tmp_path: Path, call: Call, monkeypatch: pytest.MonkeyPatch) -> None:

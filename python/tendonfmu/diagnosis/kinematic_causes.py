@@ -139,12 +139,17 @@ class KinematicCauses:
             experiment = replace(experiment, sentence=" ".join(filter(None, sentences)))
         extended = self.edited(diagnosis.extended_data) if self.is_change else diagnosis.extended_data
         verdicts = {"adequate": "explained", "unexplained": "partly explained"} if self.causes else {}
+        named = {cause.effect for cause in self.causes}
+        small, uncertain = (
+            [cause for cause in found if cause.effect not in named]
+            for found in (diagnosis.too_small, diagnosis.uncertain)
+        )
         return replace(
             diagnosis,
             verdict=verdicts.get(diagnosis.verdict, diagnosis.verdict),
             causes=tuple(by_gain([*(self._with_numbers(cause, extended) for cause in self.causes), *diagnosis.causes])),
-            too_small=(*self.too_small, *diagnosis.too_small),
-            uncertain=(*self.uncertain, *diagnosis.uncertain),
+            too_small=(*self.too_small, *small),
+            uncertain=(*self.uncertain, *uncertain),
             extended_data=extended,
             experiment=experiment,
             tested=diagnosis.tested + len(self.known),
