@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from html import unescape
 from pathlib import Path
 from typing import Any
@@ -241,6 +241,8 @@ def test_names_are_escaped_and_nothing_is_a_history_too(tmp_path: Path) -> None:
     (tmp_path / "none").mkdir()
     assert {each.name for each in write_history(nothing, NAMES, tmp_path / "none")} == {"history.html", "history.csv"}
     assert "Nothing has changed in 2 recordings." in headline(nothing)
+    loaded = replace(nothing, verdicts=("adequate", "explained"))  # a torque all the time has no line
+    assert headline(loaded).startswith("1 of 2 recordings differ from the reference")
 
 
 # --- for real ---------------------------------------------------------------------------------------------------------

@@ -85,6 +85,11 @@ class History:
         """Unit of `times`: "week" or "recording"."""
         return "week" if self.dated else "recording"
 
+    @property
+    def different(self) -> int:
+        """Number of recordings in which something differs from the reference, if only a load without a line."""
+        return sum(verdict != "adequate" for verdict in self.verdicts)
+
 
 def diagnose_history(
     finger: Finger | File,

@@ -76,6 +76,8 @@ def _page(history: History, names: Names) -> str:
 def headline(history: History) -> str:
     """Say in one sentence what has changed over all recordings."""
     count = counted(len(history.recordings), "recording")
+    if not history.lines and history.different:
+        return f"{history.different} of {count} differ from the reference, by no change to follow: diagnose each alone."
     if not history.lines:
         return f"Nothing has changed in {count}."
     return f"{counted(len(history.lines), 'change')} in {count}."

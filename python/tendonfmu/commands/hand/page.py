@@ -140,7 +140,7 @@ def history_rows(hand: Hand, results: Sequence[PartResult]) -> list[PartRow]:
             percent(worst) if count else "–",
             ", ".join(f"{name.rsplit('/', 1)[-1]}: {why}" for name, why in history.failed) or "none",
         )
-        tone = "fine" if not count else "bad" if worst >= MUCH else "doubt"
+        tone = "fine" if not count and not history.different else "bad" if worst >= MUCH else "doubt"
         value = counted(count, "change")
         return PartRow(result.part.name, tone, worst, value, value, cells, "history.html")
 
