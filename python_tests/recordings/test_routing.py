@@ -119,6 +119,25 @@ def test_friction_along_a_cord_is_no_other_spring() -> None:
     assert max(off) < 0.008 and np.mean(covered) > 0.7  # without regard to it: 0.037
 
 
+def test_springs_and_play_that_are_described_are_not_off() -> None:
+    """Progressive springs and play of the drives, as the description has them: no arm, stiffness or zero differs."""
+    hardening, play = 2e5, 0.4e-3  # N/m², m
+    finger, recording = made_up(3)
+    force, straight = recording.groups["tendon_force"], recording.groups["tendon_position"]
+    progressive = (np.sqrt(STIFFNESS**2 + 4.0 * hardening * np.abs(force)) - STIFFNESS) / (2.0 * hardening)
+    bent = straight + np.sign(force) * progressive - force / STIFFNESS
+    bent[:, 0] += play / 2.0 * turned_round(bent[:, :1], play / 2.0)[:, 0]
+    given = Recording(recording.path, recording.time, {**recording.groups, "tendon_position": bent})
+    rows = [{"effect": "tendon_nonlinearity", "tendon": i, "hardening": hardening} for i in (1, 2, 3)]
+    rows.append({"effect": "backlash", "tendon": 1, "width": play})
+    whole = finger.replace({"extensions": rows})
+    most = {
+        name: max(abs(n.off) / n.known_to for each in learn_routing(described, [given]) for n in each.numbers)
+        for name, described in (("bent", whole), ("straight", finger))
+    }
+    assert most["bent"] < 1.0 and most["straight"] > 10.0
+
+
 def test_a_finger_begun_wrong_gets_its_routing_back(index: tuple[Finger, Recording]) -> None:
     """Arms off by 20 % and stiffness by a factor of 2: within 1 and 5 %, zeros within 3 steps of the encoder."""
     finger, recording = index

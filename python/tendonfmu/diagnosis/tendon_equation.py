@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations
 
 import numpy as np
@@ -15,7 +16,15 @@ from tendonfmu.diagnosis.effects.table import ENCODER, ZERO
 from tendonfmu.diagnosis.inputs import Input
 from tendonfmu.diagnosis.result import ChangedSize
 from tendonfmu.model import moment_arms
-from tendonfmu.recordings import Learned, Recording, TendonRouting, curves, held_on_the_way, smooth_speeds
+from tendonfmu.recordings import (
+    Learned,
+    Recording,
+    TendonRouting,
+    curves,
+    held_on_the_way,
+    smooth_speeds,
+    with_linear_springs,
+)
 from tendonfmu.statistics import Interval, blocks_of, gain_interval, variance_between
 
 ARM, SPRING, COUPLING = "moment_arm", "tendon_nonlinearity", "joint_coupling"
@@ -127,10 +136,11 @@ class Unseen:
 
     def __init__(self, given: Input, learned: Sequence[TendonRouting], seed: int) -> None:
         self._seed = seed
+        linear = partial(with_linear_springs, given.finger)
         unseen = [(each, each.tracked) for each in given.tests] or [(each, each.held_out) for each in given.training]
-        self._judged = [(each.recording, blocks_of(each.time, mask)) for each, mask in unseen if mask.any()]
-        self._trained = [(each.recording, each.train) for each in given.training]
-        self._reference = [(each.recording, each.train) for each in given.reference]
+        self._judged = [(linear(each.recording), blocks_of(each.time, mask)) for each, mask in unseen if mask.any()]
+        self._trained = [(linear(each.recording), each.train) for each in given.training]
+        self._reference = [(linear(each.recording), each.train) for each in given.reference]
         self._shapes = {
             id(recording): _shapes(recording, learned, moment_arms(given.finger.data))
             for recording, _ in (*self._judged, *self._trained, *self._reference)

@@ -67,5 +67,6 @@ if TYPE_CHECKING:
         smooth_speeds,
     )
     from .signal_noise import FEWEST, BestAngles, best_angles, joint_position_noise, stopped, with_angles, zero_phase
+    from .tendon_springs import with_linear_springs
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

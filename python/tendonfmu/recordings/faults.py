@@ -14,6 +14,7 @@ from tendonfmu.arrays import Numbers
 from tendonfmu.files import counted
 from tendonfmu.model import Finger
 from tendonfmu.recordings.recording import Recording
+from tendonfmu.recordings.tendon_springs import with_linear_springs
 
 Runs = list[tuple[int, int]]  # (begin, end) of samples, end excluded
 
@@ -173,6 +174,7 @@ def _learned_values(recording: Recording, group: str, k: int, runs: Runs) -> Num
 
 def tendon_angles(recording: Recording, finger: Finger) -> Numbers:
     """Return the joint angles [N, n] (rad) that follow from tendon positions and forces, R⁺(x0 − f0/k)."""
+    recording = with_linear_springs(finger, recording)
     zero = [tendon.get("zero") or 0.0 for tendon in finger.data["tendons"]]
     position = recording.groups["tendon_position"] - _stretch(recording, finger) - zero
     return np.asarray(position @ np.linalg.pinv(np.asarray(finger.moment_arms, dtype=float)).T)

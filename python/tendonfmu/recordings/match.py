@@ -42,6 +42,7 @@ from tendonfmu.recordings.prepared import MANY_RESTS, left_at_rest
 from tendonfmu.recordings.recording import GROUP_PER, Recording, check_numbers
 from tendonfmu.recordings.routing import TendonRouting, clock_drift, learn_routing, routed
 from tendonfmu.recordings.signal_noise import white_noise
+from tendonfmu.recordings.tendon_springs import with_linear_springs
 from tendonfmu.recordings.traps import drift_finding, find_traps, trap_finding
 
 UNFIT, POOR = 0.15, 0.03  # share of variance that the equations leave: above these an error, a warning
@@ -261,6 +262,7 @@ def _likeliest(finger: Finger, recording: Recording, repair: Repair) -> Repair:
 
 def _balance(finger: Finger, recording: Recording) -> tuple[Balance, bool]:
     """Return the equations over the usable samples, and whether any joint moves in them."""
+    recording = with_linear_springs(finger, recording)
     groups = {name: values for name, values in recording.groups.items() if name in EQUATED}
     rows = _serving(finger, recording, groups)
     kept = {name: values[rows] for name, values in groups.items()}

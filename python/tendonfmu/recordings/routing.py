@@ -25,6 +25,7 @@ from tendonfmu.model import Finger
 from tendonfmu.recordings.faults import gaps, still_runs
 from tendonfmu.recordings.recording import Recording
 from tendonfmu.recordings.signal_noise import FEWEST, stopped, white_noise, zero_phase
+from tendonfmu.recordings.tendon_springs import with_linear_springs
 from tendonfmu.statistics import Estimate, noisy_regression
 
 BLOCK = 2.0  # s; longer than residuals of sensors are correlated
@@ -132,9 +133,9 @@ def learn_routing(
     # Recordings without `joint_position` count only where there are no others: then redundant tendons show every
     # stiffness, and at a single joint the arms and zeros of one against the other. What a reference of the same finger
     # shows is compared with, in place of what is described.
-    sides = [list(side) for side in (recordings, reference) if side]
     for recording in (*recordings, *reference):
         recording.require(finger.joints, finger.tendons, ())
+    sides = [[with_linear_springs(finger, each) for each in side] for side in (recordings, reference) if side]
     measured = [[each for each in side if "joint_position" in each.groups] for side in sides]
     if not all(measured):
         return _of_redundancy(finger, sides)
