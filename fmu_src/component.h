@@ -54,7 +54,7 @@ static inline int component_may_call(component* c, fmu_function function) {
 }
 
 /* Logs "<function>: <line>" as an error, enters the state "error" and returns FMU_ERROR. */
-fmu_status component_fail(component* c, const char* function, const char* format, ...) LOG_FORMAT(3);
+fmu_status component_fail(component* c, const char* function, const char* format, ...) MESSAGE_FORMAT(3);
 /* The same with the model's words. */
 fmu_status component_fail_as_model(component* c, fmu_function function);
 
@@ -78,7 +78,7 @@ fmu_status component_update_outputs(component* c, fmu_function function);
 /* NULL, with the reason in the log. `identifier` is what the importer read in modelDescription.xml, `resources` the URI
  * or path of the folder. */
 component* life_create(const log_target* log, const char* identifier, const char* resources);
-component* life_refuse(const log_target* log, const char* format, ...) LOG_FORMAT(2);
+component* life_refuse(const log_target* log, const char* format, ...) MESSAGE_FORMAT(2);
 
 fmu_status life_set_logging(component* c, int on, size_t count, const char* const categories[]);
 
