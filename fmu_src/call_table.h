@@ -103,8 +103,7 @@ typedef struct fmi_version {
   const char* state;      /* argument: a saved state */
   const char* references; /* argument: value references */
   const char* values;     /* argument: values of variables */
-  int arrays;             /* a value reference stands for all elements of a group, not for one */
-  int time_is_variable;   /* VARIABLE_TIME_REFERENCE is the independent variable */
+  int arrays;             /* a value reference stands for all elements of a group, not for one; time is a variable */
 } fmi_version;
 
 /* Of this library. */

@@ -47,7 +47,7 @@ static void component_reset(component* c) {
   variables_start(&c->values, c->model);
   c->phase = PHASE_INSTANTIATED;
   c->failed = c->inputs_given = c->outputs_pending = c->stop_time_defined = 0;
-  c->start_time = c->stop_time = c->end_of_step = 0.0;
+  c->start_time = c->stop_time = *c->values.time = 0.0;
   c->waiting = 1;
   component_forget_steps(c);
 }
@@ -237,7 +237,7 @@ fmu_status life_set_experiment(component* c, fmu_function function, const experi
     return FMU_ERROR;
   }
   variables_fetch_settings(&c->values, c->model);
-  c->start_time = c->end_of_step = e->start_time;
+  c->start_time = *c->values.time = e->start_time;
   c->stop_time_defined = e->stop_time_defined;
   c->stop_time = e->stop_time_defined ? e->stop_time : 0.0;
   return FMU_OK;
@@ -355,6 +355,6 @@ fmu_status life_step(component* c, double time, double step) {
   }
   show_sample(c);
   component_forget_steps(c);
-  c->end_of_step = time + step;
+  *c->values.time = time + step;
   return FMU_OK;
 }

@@ -8,6 +8,16 @@
 #include "model.h"
 #include "variables.h"
 
+/* Where the variables of a call live. An importer reads and writes the same ones step after step, which are found once.
+ */
+enum { PLACES_MOST = 256 }; /* of one round: a call with more takes some */
+typedef struct variable_places {
+  size_t references, elements;
+  int inputs, outputs, parameters; /* whether some are */
+  unsigned of[PLACES_MOST];        /* [references] value references */
+  unsigned place[PLACES_MOST];     /* [elements] variables_place() */
+} variable_places;
+
 typedef struct component {
   log_target log;
   char* instance_name;
@@ -21,11 +31,13 @@ typedef struct component {
   int inputs_given;    /* an input was set: there is something to initialise with */
   int outputs_pending; /* while waiting: outputs do not belong to the present inputs */
   int stop_time_defined;
-  double start_time, stop_time, end_of_step;
+  double start_time, stop_time;
 
   fmu_status step_status; /* of the last step: OK or discarded */
   unsigned refusals;      /* how often in a row the step at refused_at was discarded */
   double refused_at;      /* s */
+
+  variable_places read[VARIABLE_STRING], written[VARIABLE_STRING]; /* last, by variable_type */
 } component;
 
 void component_destroy(component* c);
@@ -42,7 +54,7 @@ static inline int component_may_call(component* c, fmu_function function) {
 }
 
 /* Logs "<function>: <line>" as an error, enters the state "error" and returns FMU_ERROR. */
-fmu_status component_fail(component* c, const char* function, const char* format, ...) LOG_FORMAT(3);
+fmu_status component_fail(component* c, const char* function, const char* format, ...) MESSAGE_FORMAT(3);
 /* The same with the model's words. */
 fmu_status component_fail_as_model(component* c, fmu_function function);
 
@@ -66,7 +78,7 @@ fmu_status component_update_outputs(component* c, fmu_function function);
 /* NULL, with the reason in the log. `identifier` is what the importer read in modelDescription.xml, `resources` the URI
  * or path of the folder. */
 component* life_create(const log_target* log, const char* identifier, const char* resources);
-component* life_refuse(const log_target* log, const char* format, ...) LOG_FORMAT(2);
+component* life_refuse(const log_target* log, const char* format, ...) MESSAGE_FORMAT(2);
 
 fmu_status life_set_logging(component* c, int on, size_t count, const char* const categories[]);
 

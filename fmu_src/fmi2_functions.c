@@ -116,7 +116,7 @@ fmi2Status fmi2GetStatus(fmi2Component instance, const fmi2StatusKind kind, fmi2
 fmi2Status fmi2GetRealStatus(fmi2Component instance, const fmi2StatusKind kind, fmi2Real* value) {
   const fmi2Status status = begin_status(instance, CALL_GET_REAL_STATUS, value, kind == fmi2LastSuccessfulTime);
   if (status == fmi2OK) {
-    *value = ((const component*)instance)->end_of_step;
+    *value = *((const component*)instance)->values.time;
   }
   return status;
 }

@@ -15,5 +15,4 @@ const fmi_version this_fmi = {
     .references = "valueReferences",
     .values = "values",
     .arrays = 1,
-    .time_is_variable = 1,
 };

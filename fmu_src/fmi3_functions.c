@@ -111,7 +111,7 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
   put_flag(terminateSimulation);
   put_flag(earlyReturn);
   if (instance && lastSuccessfulTime) {
-    *lastSuccessfulTime = ((const component*)instance)->end_of_step;
+    *lastSuccessfulTime = *((const component*)instance)->values.time;
   }
   return (fmi3Status)status;
 }

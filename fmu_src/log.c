@@ -2,22 +2,8 @@
 
 #include <string.h>
 
-#include "message.h"
-
 void log_append_list(log_text* text, const char* format, va_list arguments) {
-  const message_line line = {text->bytes, sizeof text->bytes};
-  for (; *format; ++format) {
-    const char plain[2] = {*format, '\0'};
-    if (*format != '%') {
-      message_text(line, plain);
-      continue;
-    }
-    switch (*++format) {
-      case 's': message_text(line, va_arg(arguments, const char*)); break;
-      case 'g': message_number(line, va_arg(arguments, double)); break;
-      default: message_count(line, va_arg(arguments, size_t)), ++format; break; /* %zu */
-    }
-  }
+  message_add_list((message_line){text->bytes, sizeof text->bytes}, format, arguments);
 }
 
 void log_append(log_text* text, const char* format, ...) {

@@ -1,19 +1,11 @@
 /* Messages of the FMU: one line of text put together without the heap, and the importer's logger. */
 #pragma once
 
-#include <stdarg.h>
-#include <stddef.h>
-
+#include "message.h"
 #include "variable_table.h"
 
 /* What an FMI function returns; the numbers are those of fmi2Status and fmi3Status. */
 typedef enum fmu_status { FMU_OK, FMU_WARNING, FMU_DISCARD, FMU_ERROR } fmu_status;
-
-#if defined(__GNUC__)
-#define LOG_FORMAT(at) __attribute__((format(printf, at, at + 1)))
-#else
-#define LOG_FORMAT(at)
-#endif
 
 enum { LOG_TEXT_BYTES = 512 };
 
@@ -21,10 +13,9 @@ typedef struct log_text {
   char bytes[LOG_TEXT_BYTES];
 } log_text;
 
-/* A line; too long a one is cut. Of printf's conversions %s, %g and %zu; numbers have a decimal point in every locale,
- * and all digits that they need. */
-log_text log_line(const char* format, ...) LOG_FORMAT(1);
-void log_append(log_text* text, const char* format, ...) LOG_FORMAT(2);
+/* A line, by the conversions of message.h; too long a one is cut. */
+log_text log_line(const char* format, ...) MESSAGE_FORMAT(1);
+void log_append(log_text* text, const char* format, ...) MESSAGE_FORMAT(2);
 void log_append_list(log_text* text, const char* format, va_list arguments);
 
 /* Where messages go and which are wanted. The importer's logger is of another type in each version of FMI. */

@@ -43,7 +43,7 @@ static void component_save(const component* c, void* bytes) {
   const size_t size = component_state_size(c);
   const double life[LIFE_COUNT] = {[AT_PHASE] = (double)c->phase, [AT_STOP_DEFINED] = c->stop_time_defined,
                                    [AT_START] = c->start_time,    [AT_STOP] = c->stop_time,
-                                   [AT_END] = c->end_of_step,     [AT_INPUTS_GIVEN] = c->inputs_given};
+                                   [AT_END] = *c->values.time,    [AT_INPUTS_GIVEN] = c->inputs_given};
   memcpy(to + MAGIC, magic, sizeof magic);
   store_u64(to + VERSION, STATE_VERSION);
   store_u64(to + SIZE, size);
@@ -129,7 +129,7 @@ static const char* component_restore(component* c, const void* bytes) {
   c->stop_time_defined = get_number(from, AT_STOP_DEFINED) != 0.0;
   c->start_time = get_number(from, AT_START);
   c->stop_time = get_number(from, AT_STOP);
-  c->end_of_step = get_number(from, AT_END);
+  *v->time = get_number(from, AT_END);
   c->inputs_given = get_number(from, AT_INPUTS_GIVEN) != 0.0;
   component_forget_steps(c);
   load_doubles(v->numbers, from + NUMBERS + 8 * LIFE_COUNT, v->input_count);

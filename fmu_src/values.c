@@ -7,16 +7,11 @@ fmu_status fail_at(component* c, fmu_function function, const variable* found, c
 }
 
 fmu_status fail_of_type(component* c, fmu_function function, unsigned reference, const char* type, variable* found) {
-  log_text name = log_line("time");
-  variable_type of_name = VARIABLE_REAL;
-  if (variables_find(&c->values, reference, found) == 0) {
-    name = variables_name(c->model, found);
-    of_name = variable_type_of(found);
-  } else if (!is_time(reference, VARIABLE_REAL)) {
+  if (variables_find(&c->values, reference, found)) {
     return component_fail(c, call_name(function), "no variable has the value reference %zu", (size_t)reference);
   }
-  return component_fail(c, call_name(function), "%s is of type %s, expected %s", name.bytes, this_fmi.types[of_name],
-                        type);
+  return component_fail(c, call_name(function), "%s is of type %s, expected %s", variables_name(c->model, found).bytes,
+                        this_fmi.types[variable_type_of(found)], type);
 }
 
 int may_access(component* c, fmu_function function, size_t count, const void* references, const void* values) {
@@ -35,13 +30,10 @@ fmu_status check_value_count(component* c, fmu_function function, variable_type 
   variable found = {0};
   size_t expected = this_fmi.arrays ? 0 : count;
   for (size_t i = 0; this_fmi.arrays && i < count; ++i) {
-    if (is_time(references[i], type)) {
-      ++expected;
-    } else if (find_of_type(c, function, type, references[i], &found)) {
+    if (find_of_type(c, function, type, references[i], &found)) {
       return FMU_ERROR;
-    } else {
-      expected += variables_extent(&c->values, &found);
     }
+    expected += variables_extent(&c->values, &found);
   }
   return expected == value_count
              ? FMU_OK
@@ -49,22 +41,32 @@ fmu_status check_value_count(component* c, fmu_function function, variable_type 
                               argument, value_count, expected);
 }
 
-/* A run: variables of a call whose numbers follow one another, found by the first of their value references. What an
- * importer reads and writes in each step are a few runs of inputs and outputs, which are copied as blocks. */
-typedef struct value_run {
-  variable first;
-  size_t references; /* how many of the call */
-  size_t elements;   /* their numbers */
-} value_run;
-
-/* The run that begins with references[0] [count]; otherwise says what is wrong with that one and fails. */
-static fmu_status find_run(component* c, fmu_function function, variable_type type, const unsigned references[],
-                           size_t count, value_run* run) {
-  if (find_of_type(c, function, type, references[0], &run->first)) {
-    return FMU_ERROR;
+/* Where the variables of a call live, as many as `places` holds, into it. What is wrong with one of them is said. */
+static fmu_status find_places(component* c, fmu_function function, variable_type type, const unsigned references[],
+                              size_t count, variable_places* places) {
+  variable found;
+  const size_t known = places->references;
+  if (known && known <= count && memcmp(places->of, references, known * sizeof *references) == 0) {
+    return FMU_OK;
   }
-  run->references = variables_run(&c->values, &run->first, references, count);
-  run->elements = run->first.whole ? c->values.count[run->first.id] : run->references;
+  memset(places, 0, offsetof(variable_places, of));
+  for (size_t i = 0; i < count; ++i) {
+    if (find_of_type(c, function, type, references[i], &found)) {
+      places->references = 0;
+      return FMU_ERROR;
+    }
+    const size_t extent = variables_extent(&c->values, &found), first = variables_place(&c->values, &found);
+    if (places->elements + extent > PLACES_MOST) {
+      break;
+    }
+    for (size_t k = 0; k < extent; ++k) {
+      places->place[places->elements++] = (unsigned)(first + k);
+    }
+    places->of[places->references++] = references[i];
+    places->inputs |= variable_causality_of(&found) == CAUSALITY_INPUT;
+    places->outputs |= variable_causality_of(&found) == CAUSALITY_OUTPUT;
+    places->parameters |= variable_causality_of(&found) == CAUSALITY_PARAMETER;
+  }
   return FMU_OK;
 }
 
@@ -81,63 +83,49 @@ static double given_value(const void* values, value_format format, size_t at, va
   return type == VARIABLE_BOOLEAN ? value != 0.0 : value;
 }
 
-/* Numbers, or flags in their place, which are read as Booleans: never into doubles. */
-static void put_values(void* values, value_format format, size_t at, const double* numbers, const unsigned char* flags,
-                       size_t count) {
+static void put_value(void* values, value_format format, size_t at, double value) {
   switch (format) {
-    case VALUES_INT:
-      for (size_t i = 0; i < count; ++i) {
-        ((int*)values)[at + i] = flags ? flags[i] : (int)numbers[i];
-      }
-      break;
-    case VALUES_BOOL:
-      for (size_t i = 0; i < count; ++i) {
-        ((_Bool*)values)[at + i] = flags ? flags[i] != 0 : numbers[i] != 0.0;
-      }
-      break;
-    default: memcpy((double*)values + at, numbers, count * sizeof *numbers); break;
+    case VALUES_INT: ((int*)values)[at] = (int)value; break;
+    case VALUES_BOOL: ((_Bool*)values)[at] = value != 0.0; break;
+    default: ((double*)values)[at] = value; break;
   }
 }
 
 /* --- reading ------------------------------------------------------------------------------------------------------ */
 
 /* Until the first sample is taken outputs follow the inputs; before the initialisation mode there are none. */
-static fmu_status update_outputs(component* c, fmu_function function, const variable* found) {
-  if (!c->waiting || variable_causality_of(found) != CAUSALITY_OUTPUT) {
-    return FMU_OK; /* a step brings the outputs with it */
-  }
-  if (!c->failed && c->phase == PHASE_INSTANTIATED) {
-    return fail_at(c, function, found, "an output has no value before the initialisation mode");
+static fmu_status update_outputs(component* c, fmu_function function, const unsigned references[], size_t count) {
+  variable found;
+  for (size_t i = 0; !c->failed && c->phase == PHASE_INSTANTIATED && i < count; ++i) {
+    variables_find(&c->values, references[i], &found);
+    if (variable_causality_of(&found) == CAUSALITY_OUTPUT) {
+      return fail_at(c, function, &found, "an output has no value before the initialisation mode");
+    }
   }
   return component_update_outputs(c, function);
 }
 
 fmu_status values_get(component* c, fmu_function function, variable_type type, const unsigned references[],
                       size_t count, value_format format, void* values, size_t value_count) {
-  value_run run;
   size_t at = 0;
   fmu_status status = FMU_OK;
   if (!may_access(c, function, count, references, values) ||
       check_value_count(c, function, type, references, count, value_count, "nValues")) {
     return FMU_ERROR;
   }
-  for (size_t i = 0; i < count; i += run.references, at += run.elements) {
-    if (is_time(references[i], type)) {
-      run.references = run.elements = 1;
-      put_values(values, format, at, &c->end_of_step, NULL, 1);
-      continue;
-    }
-    if (find_run(c, function, type, references + i, count - i, &run)) {
+  const variables* v = &c->values;
+  variable_places* places = &c->read[type];
+  for (size_t i = 0; i < count && status != FMU_ERROR; i += places->references) {
+    if (find_places(c, function, type, references + i, count - i, places)) {
       return FMU_ERROR;
     }
-    const fmu_status updated = update_outputs(c, function, &run.first);
-    if (updated == FMU_ERROR) {
-      return updated;
+    if (c->waiting && places->outputs) { /* later a step brings the outputs with it */
+      status = update_outputs(c, function, places->of, places->references);
     }
-    status = updated > status ? updated : status;
-    const int is_flag = variable_is_flag(&run.first);
-    put_values(values, format, at, is_flag ? NULL : variables_number(&c->values, &run.first),
-               is_flag ? c->values.flag[run.first.id] + run.first.index : NULL, run.elements);
+    for (size_t k = 0; k < places->elements; ++k) {
+      const size_t place = places->place[k];
+      put_value(values, format, at++, place < v->number_count ? v->numbers[place] : v->flags[place - v->number_count]);
+    }
   }
   return status;
 }
@@ -149,6 +137,9 @@ static fmu_status check_writable(component* c, fmu_function function, const vari
   if (variable_causality_of(found) == CAUSALITY_OUTPUT) {
     return fail_at(c, function, found, "an output is not written");
   }
+  if (variables_number(&c->values, found) == c->values.time) {
+    return fail_at(c, function, found, "the independent variable is not written");
+  }
   if (c->phase != PHASE_STEP_COMPLETE || (!found->group && model_parameter_range(c->model, found->index).tunable)) {
     return FMU_OK;
   }
@@ -156,68 +147,64 @@ static fmu_status check_writable(component* c, fmu_function function, const vari
                         variables_name(c->model, found).bytes, call_name(CALL_EXIT_INITIALIZATION_MODE));
 }
 
-/* Inputs, all of them Real: taken as they stand, whatever they are, since the step alone may discard them. */
-static int is_block(const value_run* run) {
-  return variable_causality_of(&run->first) == CAUSALITY_INPUT;
-}
-
-/* Whether every variable of the run may have its value, which stand in `values` from `at` on. */
-static fmu_status check_run(component* c, fmu_function function, const value_run* run, const void* values,
-                            value_format format, size_t at) {
-  const variable_type type = variable_type_of(&run->first);
-  for (size_t i = 0; !is_block(run) && i < run->elements; ++i) { /* one by one: the first that is refused is named */
-    const variable one = variables_element(&run->first, i);
-    const double value = given_value(values, format, at + i, type);
-    if (check_writable(c, function, run->first.whole ? &run->first : &one)) {
+/* Whether the variables may have their values, which stand in `values` from `at` on: one by one, the first that is
+ * refused is named. Inputs, all of them Real, may have any, since the step alone may discard them. */
+static fmu_status check_values(component* c, fmu_function function, const variable_places* places, const void* values,
+                               value_format format, size_t at) {
+  variable found;
+  for (size_t i = 0; i < places->references; ++i) {
+    variables_find(&c->values, places->of[i], &found);
+    const int is_input = variable_causality_of(&found) == CAUSALITY_INPUT;
+    if (!is_input && check_writable(c, function, &found)) {
       return FMU_ERROR;
     }
-    if (!variables_accept(c->model, &one, value)) {
-      return component_fail(c, call_name(function), "%s", variables_refusal(c->model, &one, value).bytes);
+    for (size_t k = 0; k < variables_extent(&c->values, &found); ++k, ++at) {
+      const variable one = variables_element(&found, k);
+      const double value = given_value(values, format, at, variable_type_of(&found));
+      if (!is_input && !variables_accept(c->model, &one, value)) {
+        return component_fail(c, call_name(function), "%s", variables_refusal(c->model, &one, value).bytes);
+      }
     }
   }
   return FMU_OK;
 }
 
-/* Values that check_run() took. */
-static void take_run(component* c, const value_run* run, const void* values, value_format format, size_t at) {
-  double* numbers = variables_number(&c->values, &run->first);
-  const variable_group* group = run->first.group;
-  c->outputs_pending = 1;
-  if (is_block(run)) {
-    c->inputs_given = 1;
-    memcpy(numbers, (const double*)values + at, run->elements * sizeof *numbers);
-    return;
-  }
-  for (size_t i = 0; i < run->elements; ++i) {
-    numbers[i] = given_value(values, format, at + i, variable_type_of(&run->first));
-    if (group && group->causality == CAUSALITY_PARAMETER) {
-      model_set_setting(c->model, run->first.id, run->first.index + i, numbers[i]);
+/* Hands the model the settings that were written. */
+static void give_settings(component* c, const variable_places* places) {
+  variable found;
+  for (size_t i = 0; i < places->references; ++i) {
+    variables_find(&c->values, places->of[i], &found);
+    c->values.parameters_pending |= !found.group;
+    const int is_setting = found.group && found.group->causality == CAUSALITY_PARAMETER;
+    for (size_t k = 0; is_setting && k < variables_extent(&c->values, &found); ++k) {
+      model_set_setting(c->model, found.id, found.index + k, variables_number(&c->values, &found)[k]);
     }
   }
-  c->values.parameters_pending |= !group;
 }
 
 fmu_status values_set(component* c, fmu_function function, variable_type type, const unsigned references[],
                       size_t count, value_format format, const void* values, size_t value_count) {
-  value_run run;
-  size_t at = 0;
   if (!may_access(c, function, count, references, values) ||
       check_value_count(c, function, type, references, count, value_count, "nValues")) {
     return FMU_ERROR;
   }
-  for (size_t i = 0; i < count; i += run.references, at += run.elements) { /* all or none */
-    if (is_time(references[i], type)) {
-      return component_fail(c, call_name(function), "time: the independent variable is not written");
-    }
-    if (find_run(c, function, type, references + i, count - i, &run) ||
-        check_run(c, function, &run, values, format, at)) {
+  variable_places* places = &c->written[type];
+  for (size_t i = 0, at = 0; i < count; i += places->references, at += places->elements) { /* all or none */
+    if (find_places(c, function, type, references + i, count - i, places) ||
+        ((places->outputs || places->parameters) && check_values(c, function, places, values, format, at))) {
       return FMU_ERROR;
     }
   }
-  at = 0;
-  for (size_t i = 0; i < count; i += run.references, at += run.elements) {
-    find_run(c, function, type, references + i, count - i, &run);
-    take_run(c, &run, values, format, at);
+  for (size_t i = 0, at = 0; i < count; i += places->references) {
+    find_places(c, function, type, references + i, count - i, places);
+    for (size_t k = 0; k < places->elements; ++k) {
+      c->values.numbers[places->place[k]] = given_value(values, format, at++, type);
+    }
+    if (places->parameters) {
+      give_settings(c, places);
+    }
+    c->outputs_pending = 1;
+    c->inputs_given |= places->inputs;
   }
   return FMU_OK;
 }

@@ -34,11 +34,6 @@ static inline fmu_status find_of_type(component* c, fmu_function function, varia
              : fail_of_type(c, function, reference, this_fmi.types[type], found);
 }
 
-/* 1 for the independent variable, which is no other variable's and has one element. */
-static inline int is_time(unsigned reference, variable_type type) {
-  return reference == VARIABLE_TIME_REFERENCE && type == VARIABLE_REAL && this_fmi.time_is_variable;
-}
-
 /* Whether the variables of a type have value_count elements together; otherwise says how many `argument` should have,
  * or what is wrong with a variable, and fails. */
 fmu_status check_value_count(component* c, fmu_function function, variable_type type, const unsigned references[],

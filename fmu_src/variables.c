@@ -56,7 +56,8 @@ int variables_create(variables* v, const model* m, int arrays) {
   v->input_count = share_out(v, CAUSALITY_INPUT, NULL);
   v->output_count = share_out(v, CAUSALITY_OUTPUT, NULL);
   const size_t settings = share_out(v, CAUSALITY_PARAMETER, NULL);
-  v->numbers = calloc(2 * (v->input_count + v->output_count) + settings + v->parameter_count, sizeof(double));
+  v->number_count = v->input_count + v->output_count + settings + v->parameter_count + 1;
+  v->numbers = calloc(v->number_count + v->input_count + v->output_count, sizeof(double));
   v->flags = calloc(share_out_flags(v, NULL), 1);
   if (!v->numbers || !v->flags) {
     return -1;
@@ -65,7 +66,8 @@ int variables_create(variables* v, const model* m, int arrays) {
   double* outputs = v->numbers + share_out(v, CAUSALITY_INPUT, v->numbers);
   double* of_settings = outputs + share_out(v, CAUSALITY_OUTPUT, outputs);
   v->parameters = of_settings + share_out(v, CAUSALITY_PARAMETER, of_settings);
-  v->derivatives = v->parameters + v->parameter_count;
+  v->time = v->parameters + v->parameter_count;
+  v->derivatives = v->numbers + v->number_count;
   variables_start(v, m);
   return 0;
 }
@@ -125,7 +127,7 @@ log_text variables_refusal(const model* m, const variable* found, double value) 
 log_text variables_name(const model* m, const variable* found) {
   char path[128];
   if (!found->group) {
-    return log_line("%s", model_parameter_path(m, found->index, path, sizeof path) == 0 ? path : "");
+    return log_line("%s", model_parameter_path(m, found->index, path, sizeof path) == 0 ? path : "time");
   }
   return found->group->size == SIZE_SCALAR || found->whole ? log_line("%s", found->group->name)
                                                            : log_line("%s[%zu]", found->group->name, found->index + 1);

@@ -15,16 +15,18 @@ typedef struct variables {
   double* derivatives;              /* [input_count + output_count] room for a second layout of these */
   unsigned char* flags;             /* likewise */
   size_t count[GROUP_COUNT];        /* elements of each group; 0 where the model does not have what it needs */
+  size_t number_count;              /* of the block, without the derivatives */
   size_t input_count, output_count; /* inputs stand first in the block, then Real and Integer outputs, then settings */
   double* number[GROUP_COUNT];      /* inputs, Real and Integer outputs, and parameters, by group; NULL for others */
   unsigned char* flag[GROUP_COUNT]; /* Boolean outputs by group, NULL for others */
   double* parameters;               /* [p] by path, as the importer set them; the model may not have them yet */
+  double* time;                     /* s, end of the last step: the independent variable of FMI 3.0 */
   int parameters_pending;           /* they may differ from those of the model */
 } variables;
 
 /* One variable, found by its value reference. */
 typedef struct variable {
-  const variable_group* group; /* NULL: a parameter by path */
+  const variable_group* group; /* NULL: a parameter by path, or behind all of them the independent variable */
   variable_group_id id;        /* of the group */
   size_t index;                /* from 0, in the group or among the parameters */
   int whole;                   /* all elements of the group from `index` on */
@@ -42,11 +44,15 @@ void variables_clear_outputs(variables* v);
 /* Settings to those of the model. */
 void variables_fetch_settings(variables* v, const model* m);
 
-/* 0 when there is such a variable. Inline, as variables_run(): it is called for every variable of every call. */
+/* 0 when there is such a variable. */
 static inline int variables_find(const variables* v, unsigned value_reference, variable* found) {
   if (value_reference >= VARIABLE_PARAMETER_BASE) {
     *found = (variable){NULL, GROUP_COUNT, value_reference - VARIABLE_PARAMETER_BASE, 0};
     return found->index < v->parameter_count ? 0 : -1;
+  }
+  if (v->arrays && value_reference == VARIABLE_TIME_REFERENCE) {
+    *found = (variable){NULL, GROUP_COUNT, v->parameter_count, 0};
+    return 0;
   }
   const variable_group_id id = value_reference < VARIABLE_GROUP_END
                                    ? (variable_group_id)variable_group_at[value_reference / VARIABLE_GROUP_SPACING]
@@ -58,19 +64,6 @@ static inline int variables_find(const variables* v, unsigned value_reference, v
   const variable_group* group = &variable_groups[id];
   *found = (variable){group, id, index, v->arrays && group->size != SIZE_SCALAR};
   return 0;
-}
-
-/* How many of the references, beginning with that of `first`, name variables whose numbers follow one another: at least
- * 1. A whole group is a run by itself. */
-static inline size_t variables_run(const variables* v, const variable* first, const unsigned references[],
-                                   size_t count) {
-  const size_t left = (first->group ? v->count[first->id] : v->parameter_count) - first->index;
-  const size_t most = first->whole ? 1 : left < count ? left : count;
-  size_t run = 1;
-  while (run < most && references[run] == references[0] + run) {
-    ++run;
-  }
-  return run;
 }
 
 /* Numbers that the variable has: those of its group when it is whole, otherwise 1. */
@@ -99,6 +92,12 @@ static inline int variable_is_flag(const variable* found) {
 /* Where the number lives. Not for Boolean outputs. */
 static inline double* variables_number(const variables* v, const variable* found) {
   return (found->group ? v->number[found->id] : v->parameters) + found->index;
+}
+
+/* The same as a place in the block of numbers; Boolean outputs stand in flags, whose places are those behind it. */
+static inline size_t variables_place(const variables* v, const variable* found) {
+  return variable_is_flag(found) ? v->number_count + (size_t)(v->flag[found->id] - v->flags) + found->index
+                                 : (size_t)(variables_number(v, found) - v->numbers);
 }
 
 /* 1 when the variable may have the value, whatever the others have; what is not a number compares false. */

@@ -5,8 +5,8 @@
 #include <math.h>
 
 #include "extensions.h"
+#include "finger_memory.h"
 #include "kernel_choice.h"
-#include "slot_view.h"
 
 /* --- jumps ----------------------------------------------------------------------------------------------------------
  */

@@ -1,14 +1,13 @@
 #include "floating_point.h"
 
-#include "directional_derivative.h"
+#include "step.h"
 
 #include <math.h>
 #include <string.h>
 
 #include "extensions.h"
-#include "friction_memory.h"
+#include "finger_memory.h"
 #include "sensor_fault.h"
-#include "slot_view.h"
 
 /* A number and its derivative along the direction. */
 typedef struct dual {

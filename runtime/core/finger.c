@@ -9,12 +9,9 @@
 
 #include "bytes.h"
 #include "derived_numbers.h"
-#include "directional_derivative.h"
 #include "kernel_choice.h"
 #include "message.h"
 #include "parameters.h"
-#include "samples.h"
-#include "saved_state.h"
 #include "sensor_fault.h"
 #include "step.h"
 
@@ -33,8 +30,13 @@ static message_line error_line(const tendonfmu_finger* finger) {
   return (message_line){((tendonfmu_finger*)(uintptr_t)finger)->error, ERROR_BYTES};
 }
 
-static tendonfmu_status fail(const tendonfmu_finger* finger, tendonfmu_status status, const char* reason) {
-  message_start(error_line(finger), reason);
+MESSAGE_FORMAT(3)
+static tendonfmu_status fail(const tendonfmu_finger* finger, tendonfmu_status status, const char* format, ...) {
+  va_list arguments;
+  message_write(error_line(finger), "%s", "");
+  va_start(arguments, format);
+  message_add_list(error_line(finger), format, arguments);
+  va_end(arguments);
   return status;
 }
 
@@ -56,7 +58,7 @@ tendonfmu_status tendonfmu_check_image(const void* image, size_t image_size, cha
     return TENDONFMU_BAD_ARGUMENT;
   }
   const message_line line = {message, message_size};
-  message_start(line, "");
+  message_write(line, "%s", "");
   /* the numbers themselves are checked where there is memory to read them into */
   return model_read_header(image, image_size, &shape, line) ? TENDONFMU_BAD_IMAGE : TENDONFMU_OK;
 }
@@ -79,20 +81,18 @@ tendonfmu_finger* tendonfmu_place(void* memory, size_t memory_size, const void* 
   const message_line line = {message, message ? message_size : 0};
   model_shape shape;
   uint32_t* words;
-  message_start(line, "");
+  message_write(line, "%s", "");
   if (!memory || !image || !kernel_rounds_as_written()) {
-    message_start(line, memory && image
-                            ? "compiled with -ffast-math, -ffp-contract=fast or the like: expected none of them"
-                            : "memory and image must not be NULL");
+    message_write(line, "%s",
+                  memory && image ? "compiled with -ffast-math, -ffp-contract=fast or the like: expected none of them"
+                                  : "memory and image must not be NULL");
     return NULL;
   }
   if (model_read_header(image, image_size, &shape, line)) {
     return NULL;
   }
   if (memory_size < finger_memory_size(&shape)) {
-    message_start(line, "too little memory for this finger: expected at least ");
-    message_count(line, finger_memory_size(&shape));
-    message_text(line, " bytes");
+    message_write(line, "too little memory for this finger: expected at least %zu bytes", finger_memory_size(&shape));
     return NULL;
   }
   tendonfmu_finger* finger = finger_lay_out(&shape, memory, &words);
@@ -111,9 +111,7 @@ tendonfmu_finger* tendonfmu_create(const void* image, size_t image_size, char* m
   const size_t size = tendonfmu_memory_size(image, image_size);
   void* memory = size ? malloc(size) : NULL;
   if (size && !memory) {
-    message_start(line, "out of memory: expected ");
-    message_count(line, size);
-    message_text(line, " bytes");
+    message_write(line, "out of memory: expected %zu bytes", size);
     return NULL;
   }
   unsigned char unused[1]; /* so that a refused image is refused with its reason */
@@ -215,9 +213,8 @@ static tendonfmu_status take(tendonfmu_finger* finger, double time, const tendon
   switch (take_sample(finger, time)) {
     case SAMPLE_OUT_OF_RANGE: samples_name_bad_input(finger, time, inputs, error_line(finger)); break;
     case SAMPLE_OVERFLOWS:
-      message_start(error_line(finger), "the sample at time ");
-      message_number(error_line(finger), time);
-      message_text(error_line(finger), " s overflows: expected forces and velocities whose torques are finite");
+      message_write(error_line(finger),
+                    "the sample at time %g s overflows: expected forces and velocities whose torques are finite", time);
       recall_rows(finger);
       forget_views(finger); /* they follow its velocities, which nothing else remembers */
       break;
@@ -332,10 +329,8 @@ static int has_parameter(const tendonfmu_finger* finger, size_t index) {
   if (index < finger->shape.parameter_count) {
     return 1;
   }
-  message_start(error_line(finger), "parameter index ");
-  message_count(error_line(finger), index);
-  message_text(error_line(finger), ": expected below ");
-  message_count(error_line(finger), finger->shape.parameter_count);
+  message_write(error_line(finger), "parameter index %zu: expected below %zu", index,
+                (size_t)finger->shape.parameter_count);
   return 0;
 }
 
@@ -399,9 +394,7 @@ tendonfmu_status tendonfmu_get_parameters(const tendonfmu_finger* finger, size_t
 static int say_fixed(const tendonfmu_finger* finger, const model_item* item, uint32_t index) {
   char path[PARAMETER_PATH_BYTES];
   parameter_path(item, index, path);
-  message_start(error_line(finger), path);
-  message_text(error_line(finger), " is fixed once the first sample is taken");
-  return -1;
+  return message_write(error_line(finger), "%s is fixed once the first sample is taken", path);
 }
 
 typedef struct candidate_check {
@@ -499,10 +492,7 @@ static int find_or_fail(const tendonfmu_finger* finger, const char* path, size_t
   if (*index < finger->shape.parameter_count) {
     return 0;
   }
-  message_start(error_line(finger), "no parameter \"");
-  message_text(error_line(finger), path);
-  message_text(error_line(finger), "\" in this finger");
-  return -1;
+  return message_write(error_line(finger), "no parameter \"%s\" in this finger", path);
 }
 
 tendonfmu_status tendonfmu_get_parameter(const tendonfmu_finger* finger, const char* path, double* value) {

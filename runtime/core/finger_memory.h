@@ -377,3 +377,23 @@ size_t finger_memory_size(const model_shape* shape);
 /* Lays a finger of a checked image header into memory of that size, all zeros; words receives room for the shape words.
  */
 tendonfmu_finger* finger_lay_out(const model_shape* shape, void* memory, uint32_t** words);
+
+/* --- the laws in force at a slot (slot_view.c): the side by the sign of its velocity, the working points by the joint
+ * angle --- */
+
+/* Fills the view of `count` slots from `slot` on: its lanes from slot % 4 on.
+ *   angle         of the joint before (q_0 = 0); of no meaning to the slots of joints
+ *   negative      one bit a lane: the law's side for v < 0 */
+void slot_view_fill(const tendonfmu_finger* finger, size_t slot, size_t count, double angle, int negative,
+                    slot_view* view);
+
+/* Segment of a grid in which an angle lies, as the number of working points at or below it. */
+size_t slot_segment(const tendonfmu_finger* finger, size_t joint, size_t tendon, double angle);
+
+/* Laws of one effect: a single one, or those of the segment between two working points. */
+typedef struct effect_laws {
+  const double *below, *above; /* above NULL: no working points */
+  double weight, weight_slope; /* of the one above, and along a direction of the angle */
+} effect_laws;
+
+effect_laws edge_laws(const tendonfmu_finger* finger, size_t joint, size_t tendon, double angle, double angle_slope);

@@ -1,12 +1,16 @@
 #include "floating_point.h"
 
-#include "friction_memory.h"
+#include "extensions.h"
 
 #include <string.h>
 
 #include "effect_facts.h"
 #include "friction_law.h"
 #include "kernel_choice.h"
+
+/* Friction with a memory: numbers alone. */
+const effect_type effect_presliding = {PRESLIDING_FACTS, .kind = EFFECT_MEMORY};
+const effect_type effect_cord_stretch = {CORD_STRETCH_FACTS, .kind = EFFECT_MEMORY};
 
 #define LEAST_DISTANCE 1e-150 /* m, rad: however short, no product in a step overflows */
 #define STEEPEST       1e290  /* 1/m, 1/rad, of z */

@@ -6,10 +6,10 @@
 #include <math.h>
 
 #include "message.h"
-#include "samples.h"
+#include "step.h"
 
 static tendonfmu_status refuse(tendonfmu_finger* finger, const char* reason) {
-  message_start((message_line){finger->error, ERROR_BYTES}, reason);
+  message_write((message_line){finger->error, ERROR_BYTES}, "%s", reason);
   return TENDONFMU_BAD_ARGUMENT;
 }
 

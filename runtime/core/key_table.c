@@ -4,7 +4,6 @@
 
 #include "key_table.h"
 
-#include "model_options.h"
 
 static const key_row rows[] = {
   {"joints[%j].cover.stiffness", "N.m/rad", 0.0, 1000000000.0, 0, 1, 0, 0.0, KEY_ONE, 0},

@@ -12,6 +12,22 @@ enum {
   MODEL_MAX_EXTENSIONS = 1024
 };
 
+/* The option bits of the model image: which parts of a description are there. The bits of keys stand in
+ * description/keys.json by their names. */
+enum {
+  MODEL_HAS_INITIAL_VARIANCE = 1,
+  MODEL_HAS_INITIAL_TORQUE = 2,
+  MODEL_HAS_NOISE_TIME = 4,
+  MODEL_HAS_SENSOR_FAULT = 8,
+  MODEL_FORGETS_BY_ABSORPTION = 16,
+  MODEL_DETECTS_BY_BANDS = 32,
+  MODEL_WATCHES_MOTORS = 64, /* beside the bit before */
+  MODEL_HAS_DEVIATION = 128,
+  MODEL_HAS_LINKS = 256,
+  MODEL_HAS_TENDON_ZERO = 512, /* of any tendon; then every one has it */
+  MODEL_OPTION_BITS = 1023
+};
+
 /* The parameters come in items, in this order: joints, tendons, finger, extensions. */
 typedef enum model_item_kind {
   ITEM_COVER, /* joints[j].cover */
@@ -69,7 +85,7 @@ typedef struct key_row {
   unsigned char tunable, has_default;
   double default_value;
   key_count count;
-  uint32_t option; /* the bit of the model image (model_options.h) without which it is not there; 0: always there */
+  uint32_t option; /* the bit of the model image without which it is not there; 0: always there */
 } key_row;
 
 /* The row of number `offset` of an item; not of ITEM_EXTENSION. */

@@ -3,14 +3,7 @@
 #include <stdint.h>
 #include <string.h>
 
-void message_start(message_line line, const char* text) {
-  if (line.size) {
-    line.text[0] = 0;
-  }
-  message_text(line, text);
-}
-
-void message_text(message_line line, const char* text) {
+static void add_text(message_line line, const char* text) {
   if (!line.size) {
     return;
   }
@@ -131,16 +124,16 @@ static void write_digits(const char* digits, int precision, int power, char* tex
   *text = 0;
 }
 
-void message_number(message_line line, double value) {
+static void add_number(message_line line, double value) {
   char digits[17], text[40];
   uint64_t bits;
   int power = 0, precision = 6;
   memcpy(&bits, &value, sizeof bits);
   const int exponent = (int)(bits >> 52 & 2047), twos = exponent ? exponent - 1075 : -1074;
   const uint64_t fraction = bits & (((uint64_t)1 << 52) - 1), mantissa = fraction | (uint64_t)(exponent > 0) << 52;
-  message_text(line, bits >> 63 ? "-" : "");
+  add_text(line, bits >> 63 ? "-" : "");
   if (exponent == 2047 || mantissa == 0) {
-    message_text(line, mantissa == 0 ? "0" : fraction ? "nan" : "inf");
+    add_text(line, mantissa == 0 ? "0" : fraction ? "nan" : "inf");
     return;
   }
   /* the shortest of the usual precisions that reads back as the same number */
@@ -148,22 +141,49 @@ void message_number(message_line line, double value) {
     precision += precision == 6 ? 9 : 2;
   }
   write_digits(digits, precision, power, text);
-  message_text(line, text);
+  add_text(line, text);
 }
 
-void message_count(message_line line, size_t value) {
+static void add_count(message_line line, size_t value) {
   char digits[24], *first = digits + sizeof digits - 1;
   *first = 0;
   do {
     *--first = (char)('0' + value % 10);
     value /= 10;
   } while (value);
-  message_text(line, first);
+  add_text(line, first);
 }
 
-void message_element(message_line line, const char* name, size_t index) {
-  message_start(line, name);
-  message_text(line, "[");
-  message_count(line, index);
-  message_text(line, "]");
+void message_add_list(message_line line, const char* format, va_list arguments) {
+  for (; *format; ++format) {
+    const char plain[2] = {*format, '\0'};
+    if (*format != '%') {
+      add_text(line, plain);
+      continue;
+    }
+    switch (*++format) {
+      case 's': add_text(line, va_arg(arguments, const char*)); break;
+      case 'g': add_number(line, va_arg(arguments, double)); break;
+      default: add_count(line, va_arg(arguments, size_t)), ++format; break; /* %zu */
+    }
+  }
+}
+
+int message_add(message_line line, const char* format, ...) {
+  va_list arguments;
+  va_start(arguments, format);
+  message_add_list(line, format, arguments);
+  va_end(arguments);
+  return -1;
+}
+
+int message_write(message_line line, const char* format, ...) {
+  va_list arguments;
+  if (line.size) {
+    line.text[0] = 0;
+  }
+  va_start(arguments, format);
+  message_add_list(line, format, arguments);
+  va_end(arguments);
+  return -1;
 }

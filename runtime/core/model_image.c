@@ -161,19 +161,9 @@ uint32_t model_count_parameters(const model_shape* shape) {
 
 /* --- reading ---------------------------------------------------------------------------------------------------- */
 
-static int refuse(message_line message, const char* reason) {
-  message_start(message, reason);
-  return -1;
-}
-
 /* "<what> <value>, expected <expectation>" */
 static int refuse_value(message_line message, const char* what, size_t value, const char* expectation) {
-  message_start(message, what);
-  message_text(message, " ");
-  message_count(message, value);
-  message_text(message, ", expected ");
-  message_text(message, expectation);
-  return -1;
+  return message_write(message, "%s %zu, expected %s", what, value, expectation);
 }
 
 static uint64_t unpadded_size(const model_shape* shape) {
@@ -194,19 +184,19 @@ static int check_options(const model_shape* shape) {
 static int read_counts(const void* image, size_t image_size, model_shape* shape, message_line message) {
   const unsigned char* bytes = image;
   if (!image || image_size < MODEL_HEADER_BYTES || memcmp(bytes, magic, sizeof magic) != 0) {
-    return refuse(message, "not a model image: it does not begin with \"TFMUIMG\"");
+    return message_write(message, "not a model image: it does not begin with \"TFMUIMG\"");
   }
   if (load_u32(bytes + 8) != MODEL_VERSION) {
     return refuse_value(message, "model image of version", load_u32(bytes + 8), "1");
   }
   if (load_u32(bytes + 12) != 0) {
-    return refuse(message, "damaged model image: its reserved bytes are not zero");
+    return message_write(message, "damaged model image: its reserved bytes are not zero");
   }
   if (load_u64(bytes + 16) != image_size) {
-    return refuse(message, "model image cut off: its size is not the one in its header");
+    return message_write(message, "model image cut off: its size is not the one in its header");
   }
   if (load_u64(bytes + 24) != hash_bytes(bytes + 32, image_size - 32, 0)) {
-    return refuse(message, "damaged model image: its checksum does not match");
+    return message_write(message, "damaged model image: its checksum does not match");
   }
   *shape = (model_shape){.joints = load_u32(bytes + 32),
                          .tendons = load_u32(bytes + 36),
@@ -230,7 +220,7 @@ static int read_counts(const void* image, size_t image_size, model_shape* shape,
     return refuse_value(message, "model image: option bits", shape->options, "ones that go together");
   }
   if (values_offset(shape) + 8u * (uint64_t)shape->parameter_count != image_size) {
-    return refuse(message, "model image whose counts do not add up to its size");
+    return message_write(message, "model image whose counts do not add up to its size");
   }
   return 0;
 }
@@ -296,15 +286,15 @@ static int check_shape(const unsigned char* words, model_shape* shape, message_l
   for (uint32_t j = 0; j < shape->joints; ++j) {
     const uint32_t word = next_word(&r);
     if (word > 31 || (word >> 1 & 3) == 3 || word >> 3 == 3) {
-      return refuse(message, "model image with a damaged shape: joints");
+      return message_write(message, "model image with a damaged shape: joints");
     }
   }
   for (uint32_t i = 0; i < shape->tendons; ++i) {
     if (check_tendon(&r, shape)) {
-      return refuse(message, "model image with a damaged shape: tendons");
+      return message_write(message, "model image with a damaged shape: tendons");
     }
   }
-  return r.overrun || r.left ? refuse(message, "model image with a damaged shape: number of words") : 0;
+  return r.overrun || r.left ? message_write(message, "model image with a damaged shape: number of words") : 0;
 }
 
 static int place_is_sound(const effect_type* effect, const model_shape* shape, const uint32_t place[3]) {
@@ -350,7 +340,7 @@ static int check_extension(const unsigned char* table, uint32_t i, model_shape* 
   }
   const uint32_t same = effect->most ? same_rows(table, i) : 0;
   if (same > (uint32_t)effect->most) {
-    return refuse(message, "model image with more extensions of one effect at a place than that may have");
+    return message_write(message, "model image with more extensions of one effect at a place than that may have");
   }
   if (effect == &effect_presliding && same > shape->elements) {
     shape->elements = same;

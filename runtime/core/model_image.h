@@ -27,7 +27,6 @@
 #include "effect.h"
 #include "key_table.h" /* the kinds of items, and the largest numbers of things */
 #include "message.h"
-#include "model_options.h"
 
 enum {
   MODEL_VERSION = 1,

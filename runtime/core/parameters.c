@@ -21,13 +21,11 @@ static uint32_t index_of(const model_item* item, uint32_t offset, char letter) {
 /* writes what stands for %letter in the path of a row (key_row) */
 static void write_part(message_line path, const model_item* item, uint32_t offset, char letter) {
   if (letter == '~') {
-    message_text(path, item->law != LAW_ASYMMETRIC ? "" : offset < 4 ? ".positive" : ".negative");
+    message_add(path, "%s", item->law != LAW_ASYMMETRIC ? "" : offset < 4 ? ".positive" : ".negative");
   } else if (letter != '@') {
-    message_count(path, index_of(item, offset, letter));
+    message_add(path, "%zu", (size_t)index_of(item, offset, letter));
   } else if (item->has_angles) {
-    message_text(path, ".laws[");
-    message_count(path, item->point + 1);
-    message_text(path, "]");
+    message_add(path, ".laws[%zu]", (size_t)item->point + 1);
   }
 }
 
@@ -37,7 +35,7 @@ static void write_path(message_line path, const model_item* item, uint32_t offse
     const size_t length = strcspn(pattern, "%");
     memcpy(plain, pattern, length);
     plain[length] = '\0';
-    message_text(path, plain);
+    message_add(path, "%s", plain);
     pattern += length;
     if (*pattern) {
       write_part(path, item, offset, pattern[1]);
@@ -49,15 +47,12 @@ static void write_path(message_line path, const model_item* item, uint32_t offse
 void parameter_path(const model_item* item, uint32_t index, char* path) {
   const message_line line = {path, PARAMETER_PATH_BYTES};
   const uint32_t offset = index - item->first;
-  message_start(line, "");
+  path[0] = 0;
   if (item->kind != ITEM_EXTENSION) {
     write_path(line, item, offset, key_row_of(item->kind, offset)->path);
     return;
   }
-  message_text(line, "extensions[");
-  message_count(line, item->extension + 1);
-  message_text(line, "].");
-  message_text(line, item->effect->parameters[offset].name);
+  message_add(line, "extensions[%zu].%s", (size_t)item->extension + 1, item->effect->parameters[offset].name);
 }
 
 typedef struct search {
@@ -121,19 +116,13 @@ parameter_range parameter_range_of(const model_item* item, uint32_t index) {
 static void say_value(message_line message, const model_item* item, uint32_t index, double value) {
   char path[PARAMETER_PATH_BYTES];
   parameter_path(item, index, path);
-  message_start(message, path);
-  message_text(message, " = ");
-  message_number(message, value);
+  message_write(message, "%s = %g", path, value);
 }
 
 void parameter_say_range(const model_item* item, uint32_t index, message_line message) {
   const parameter_range range = parameter_range_of(item, index);
-  message_text(message, range.above_minimum ? "above " : "");
-  message_number(message, range.minimum);
-  message_text(message, range.above_minimum ? " and at most " : " to ");
-  message_number(message, range.maximum);
-  message_text(message, " ");
-  message_text(message, range.unit);
+  message_add(message, range.above_minimum ? "above %g and at most %g %s" : "%g to %g %s", range.minimum, range.maximum,
+              range.unit);
 }
 
 int parameter_check_value(const model_item* item, uint32_t index, double value, message_line message) {
@@ -142,7 +131,7 @@ int parameter_check_value(const model_item* item, uint32_t index, double value, 
     return 0;
   }
   say_value(message, item, index, value);
-  message_text(message, ": expected ");
+  message_add(message, ": expected ");
   parameter_say_range(item, index, message);
   return -1;
 }
@@ -168,9 +157,7 @@ static int check_law(const check* c, const model_item* item) {
   for (uint32_t i = item->first; i < item->first + item->count; i += 4) {
     if (c->values[i] < c->values[i + 1]) {
       say_value(c->message, item, i, c->values[i]);
-      message_text(c->message, ": expected at least coulomb = ");
-      message_number(c->message, c->values[i + 1]);
-      return -1;
+      return message_add(c->message, ": expected at least coulomb = %g", c->values[i + 1]);
     }
   }
   return 0;
@@ -180,10 +167,7 @@ static int check_angles(const check* c, const model_item* item) {
   for (uint32_t i = item->first + 1; i < item->first + item->count; ++i) {
     if (!(c->values[i] > c->values[i - 1])) {
       say_value(c->message, item, i, c->values[i]);
-      message_text(c->message, ": expected above the angle before it, ");
-      message_number(c->message, c->values[i - 1]);
-      message_text(c->message, " rad");
-      return -1;
+      return message_add(c->message, ": expected above the angle before it, %g rad", c->values[i - 1]);
     }
   }
   return 0;
@@ -195,8 +179,7 @@ static int check_axis(const check* c, const model_item* item) {
     return 0;
   }
   say_value(c->message, item, item->first, axis[0]);
-  message_text(c->message, ": expected an axis whose three numbers are not all 0");
-  return -1;
+  return message_add(c->message, ": expected an axis whose three numbers are not all 0");
 }
 
 /* the thresholds come before the extensions */
@@ -219,9 +202,8 @@ static int check_one_of(const check* c, const model_item* item) {
     return 0;
   }
   say_value(c->message, item, item->first + last, values[last]);
-  message_text(c->message, above ? ": expected 0 beside " : ": expected above 0, here or in ");
-  message_text(c->message, item->effect->parameters[above ? 0 : 1].name);
-  return -1;
+  return message_add(c->message, above ? ": expected 0 beside %s" : ": expected above 0, here or in %s",
+                     item->effect->parameters[above ? 0 : 1].name);
 }
 
 /* a row without a place that counts distances by thresholds */
@@ -234,14 +216,9 @@ static int check_extension(const check* c, const model_item* item) {
     return 0;
   }
   say_value(c->message, &c->threshold, c->threshold.first, 0.0);
-  message_text(c->message, ": expected above 0 ");
-  message_text(c->message, parameter_range_of(&c->threshold, c->threshold.first).unit);
-  message_text(c->message, ", since extensions[");
-  message_count(c->message, item->extension + 1);
-  message_text(c->message, "], ");
-  message_text(c->message, item->effect->name);
-  message_text(c->message, " without joint or tendon, multiplies it");
-  return -1;
+  return message_add(
+      c->message, ": expected above 0 %s, since extensions[%zu], %s without joint or tendon, multiplies it",
+      parameter_range_of(&c->threshold, c->threshold.first).unit, (size_t)item->extension + 1, item->effect->name);
 }
 
 static int check_relation(void* context, const model_item* item) {
@@ -281,12 +258,10 @@ int parameter_check_routing(const model_shape* shape, const double* values, mess
   routing r = {.values = values};
   model_visit(shape, collect_arms, &r);
   if (pseudo_inverse(shape->tendons, shape->joints, r.rows, r.rows) < shape->joints) {
-    message_start(message,
-                  "tendons: moment_arms are not of full column rank, so the joint angles do not follow from "
-                  "the tendon positions; expected ");
-    message_count(message, shape->joints);
-    message_text(message, " linearly independent columns");
-    return -1;
+    return message_write(message,
+                         "tendons: moment_arms are not of full column rank, so the joint angles do not follow from "
+                         "the tendon positions; expected %zu linearly independent columns",
+                         (size_t)shape->joints);
   }
   return 0;
 }

@@ -1,6 +1,6 @@
 #include "floating_point.h"
 
-#include "samples.h"
+#include "step.h"
 
 #include <math.h>
 #include <string.h>
@@ -44,15 +44,8 @@ static int check_time(const tendonfmu_finger* f, double time, message_line messa
   if (fabs(time) <= LARGEST_TIME && (!initialised || time >= before)) {
     return 0;
   }
-  message_start(message, "time = ");
-  message_number(message, time);
-  message_text(message, " s: expected a finite number of magnitude at most 1e+15 s");
-  if (initialised) {
-    message_text(message, ", not before the sample already taken at ");
-    message_number(message, before);
-    message_text(message, " s");
-  }
-  return -1;
+  message_write(message, "time = %g s: expected a finite number of magnitude at most 1e+15 s", time);
+  return initialised ? message_add(message, ", not before the sample already taken at %g s", before) : -1;
 }
 
 int samples_take_inputs(tendonfmu_finger* finger, double time, const tendonfmu_inputs* inputs, message_line message) {
@@ -63,9 +56,9 @@ int samples_take_inputs(tendonfmu_finger* finger, double time, const tendonfmu_i
   }
   for (size_t k = 0; k < count; ++k) {
     if (!rows[k].values) {
-      message_start(message, rows[k].name);
-      message_text(message, " is missing: this kinematics source, or contact.watches_motors or sensor_fault, needs it");
-      return -1;
+      return message_write(message,
+                           "%s is missing: this kinematics source, or contact.watches_motors or sensor_fault, needs it",
+                           rows[k].name);
     }
     memcpy(rows[k].to, rows[k].values, rows[k].count * sizeof(double));
   }
@@ -80,13 +73,8 @@ void samples_name_bad_input(const tendonfmu_finger* finger, double time, const t
     for (size_t i = 0; i < rows[k].count; ++i) {
       const double value = rows[k].values[i];
       if (!(fabs(value) <= LARGEST_INPUT)) {
-        message_element(message, rows[k].name, i + 1);
-        message_text(message, " = ");
-        message_number(message, value);
-        message_text(message, " at time ");
-        message_number(message, time);
-        message_text(message, " s: expected a finite number of magnitude at most 1e+12 ");
-        message_text(message, rows[k].unit);
+        message_write(message, "%s[%zu] = %g at time %g s: expected a finite number of magnitude at most 1e+12 %s",
+                      rows[k].name, i + 1, value, time, rows[k].unit);
         return;
       }
     }

@@ -1,6 +1,6 @@
 #include "floating_point.h"
 
-#include "saved_state.h"
+#include "step.h"
 
 #include <string.h>
 
@@ -28,11 +28,6 @@ void save_state(const tendonfmu_finger* finger, void* bytes) {
   store_doubles(to + HEADER_BYTES, finger->parameters, p);
   store_doubles(to + HEADER_BYTES + 8 * p, finger->state, finger->state_count);
   store_u64(to + 24, hash_bytes(to + HASHED_FROM, size - HASHED_FROM, 0));
-}
-
-static int refuse(message_line message, const char* reason) {
-  message_start(message, reason);
-  return -1;
 }
 
 /* whether lane i of such a row stands for something */
@@ -107,17 +102,17 @@ static int rests_are_sound(const tendonfmu_finger* f, const unsigned char* state
 static int check_bytes(tendonfmu_finger* f, const unsigned char* from, message_line message) {
   const size_t size = saved_state_size(f), p = f->shape.parameter_count;
   if (memcmp(from, magic, sizeof magic) != 0 || load_u32(from + 8) != STATE_VERSION) {
-    return refuse(message, "not a saved state of this version: it does not begin with \"TFMUSTA\" and 3");
+    return message_write(message, "not a saved state of this version: it does not begin with \"TFMUSTA\" and 3");
   }
   if (load_u32(from + 12) != 0 || load_u64(from + 16) != size || load_u64(from + 32) != f->image_id) {
-    return refuse(message, "saved state of another finger: size or model image differ");
+    return message_write(message, "saved state of another finger: size or model image differ");
   }
   if (load_u64(from + 24) != hash_bytes(from + HASHED_FROM, size - HASHED_FROM, 0)) {
-    return refuse(message, "damaged saved state: its checksum does not match");
+    return message_write(message, "damaged saved state: its checksum does not match");
   }
   const unsigned char* state = from + HEADER_BYTES + 8 * p;
   if (!rows_are_sound(f, state) || !bands_are_sound(f, state) || !rests_are_sound(f, state)) {
-    return refuse(message, "damaged saved state: a number is out of its range");
+    return message_write(message, "damaged saved state: a number is out of its range");
   }
   load_doubles(f->candidate, from + HEADER_BYTES, p);
   const int same = memcmp(f->candidate, f->parameters, p * sizeof(double)) == 0;

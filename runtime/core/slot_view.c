@@ -1,6 +1,6 @@
 #include "floating_point.h"
 
-#include "slot_view.h"
+#include "finger_memory.h"
 
 #include <math.h>
 

@@ -5,9 +5,7 @@
 #include <math.h>
 
 #include "bias_tracker.h"
-#include "contact_detector.h"
 #include "extensions.h"
-#include "friction_memory.h"
 #include "kernel_choice.h"
 #include "sensor_fault.h"
 

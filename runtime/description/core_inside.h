@@ -4,6 +4,7 @@
 /* what the core includes of the C library: its names never come to stand in extern "C" */
 #include <cfloat>
 #include <cmath>
+#include <cstdarg>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -23,7 +24,6 @@ extern "C" {
 #include "parameters.h"
 #include "pseudo_inverse.h"
 #include "sensor_fault.h"
-#include "slot_view.h"
 }
 
 namespace tendonfmu {

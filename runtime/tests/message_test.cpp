@@ -16,28 +16,24 @@ namespace {
 std::string number(double value) {
   char text[64];
   const message_line line = {text, sizeof text};
-  message_start(line, "");
-  message_number(line, value);
+  message_write(line, "%g", value);
   return text;
 }
 
 TEST(Message, IsPutTogetherFromTextsAndNumbers) {
   char text[100] = "old";
   const message_line line = {text, sizeof text};
-  message_element(line, "tendon_force", 3);
-  message_text(line, " = ");
-  message_number(line, -1.5);
-  message_text(line, ", row ");
-  message_count(line, 18446744073709551615u);
+  EXPECT_EQ(message_write(line, "%s[%zu] = %g", "tendon_force", std::size_t{3}, -1.5), -1);
+  EXPECT_EQ(message_add(line, ", row %zu", std::size_t{18446744073709551615u}), -1);
   EXPECT_STREQ(text, "tendon_force[3] = -1.5, row 18446744073709551615");
 }
 
 TEST(Message, IsCutAtTheEndOfItsRoom) {
   char text[8] = {1, 1, 1, 1, 1, 1, 1, 42};
   const message_line line = {text, 7};
-  message_start(line, "abc");
-  message_text(line, "defghij");
-  message_text(line, "k");
+  message_write(line, "abc");
+  message_add(line, "%s", "defghij");
+  message_add(line, "k");
   EXPECT_STREQ(text, "abcdef");
   EXPECT_EQ(text[7], 42);
 }
@@ -45,8 +41,8 @@ TEST(Message, IsCutAtTheEndOfItsRoom) {
 TEST(Message, StaysOnOneLineWhateverItIsGiven) {
   char text[40] = "";
   const message_line line = {text, sizeof text};
-  message_start(line, "a\nb\tc\x7f\x01");
-  message_text(line, "\r\nd\u00fc");
+  message_write(line, "a\nb\tc%s", "\x7f\x01");
+  message_add(line, "%s", "\r\nd\u00fc");
   EXPECT_STREQ(text, "a?b?c????d\u00fc");
 }
 

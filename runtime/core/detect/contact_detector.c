@@ -1,6 +1,6 @@
 #include "floating_point.h"
 
-#include "contact_detector.h"
+#include "bias_tracker.h"
 
 #include <math.h>
 

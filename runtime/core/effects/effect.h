@@ -1,4 +1,4 @@
-/* A term beyond the paper: a file for those of a kind, one row each in effect_table.c
+/* A term beyond the paper: a file for those of a kind, one row each in the tables of effect_facts.c
  * (docs/reference/semantics/effects.md has the text they follow).
  *
  * A term acts in one of three ways: on the signals before the joint angles are known, on the friction values of some
@@ -102,7 +102,7 @@ typedef struct effect_grip {
   double by_velocity; /* s/m or s/rad */
 } effect_grip;
 
-/* EFFECT_MEMORY: numbers alone, which friction_memory.h reads. */
+/* EFFECT_MEMORY: numbers alone, which friction_memory.c reads. */
 typedef enum effect_kind { EFFECT_TORQUE, EFFECT_FRICTION, EFFECT_SIGNAL, EFFECT_MEMORY } effect_kind;
 
 typedef struct effect_type {

@@ -1,5 +1,5 @@
 /* Friction with a memory (docs/reference/semantics/presliding.md): elements that are elastic until they slip, four
- * places at a time. Which rows hold where is in friction_memory.h. */
+ * places at a time. Which rows hold where is in friction_memory.c. */
 #pragma once
 
 #include "finger_memory.h"

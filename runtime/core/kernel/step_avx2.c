@@ -13,7 +13,7 @@
 
 #define TENDONFMU_QUAD_AVX2
 #define TENDONFMU_QUAD_LANES 4
-#include "step_kernel.h"
+#include "force_propagation.h"
 
 const step_kernel step_avx2 = STEP_KERNEL("avx2");
 

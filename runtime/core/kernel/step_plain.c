@@ -1,6 +1,6 @@
 /* The step in plain C, for any machine. */
 #include "floating_point.h"
 
-#include "step_kernel.h"
+#include "force_propagation.h"
 
 const step_kernel step_plain = STEP_KERNEL("plain");

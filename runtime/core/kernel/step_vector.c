@@ -9,7 +9,7 @@
 #else
 #define TENDONFMU_QUAD_LANES 2
 #endif
-#include "step_kernel.h"
+#include "force_propagation.h"
 
 #if defined(__x86_64__)
 const step_kernel step_vector = STEP_KERNEL("sse2");
