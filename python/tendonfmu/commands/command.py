@@ -12,6 +12,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import wraps
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -99,7 +100,7 @@ class Line(NamedTuple):
 
 
 LINES: dict[str, Line] = {}  # by the name of the command
-OF_HANDS: dict[str, Callable[..., None]] = {}  # takes the same where the first argument is a hand
+OF_HANDS = ("check", "run", "calibrate", "diagnose", "score")  # commands that take a hand in place of a finger
 
 
 def command(
@@ -118,11 +119,6 @@ def command(
         return function
 
     return decorate
-
-
-def of_hand(name: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Decorate what a command does with a hand in place of a finger."""
-    return lambda function: OF_HANDS.setdefault(name, function)
 
 
 def is_hand(path: Path) -> bool:
@@ -144,8 +140,10 @@ def for_typer(name: str) -> Callable[..., None]:
             # typer has None where nothing was given
             arguments["options"] = line.options(**{key: value for key, value in taken.items() if value is not None})
         with _standard_input(arguments, line.reads) as read:
-            hand = name in OF_HANDS and is_hand(next(iter(read.values())))
-            (OF_HANDS[name] if hand else line.function)(**read)
+            function = line.function
+            if name in OF_HANDS and is_hand(next(iter(read.values()))):
+                function = getattr(import_module("tendonfmu.commands.hand.commands"), f"{name}_hand")
+            function(**read)
 
     run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
