@@ -7,7 +7,6 @@ Every command takes `--json` and `--quiet`; a command with options shared by sev
 from __future__ import annotations
 
 import inspect
-import math
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -21,7 +20,7 @@ from typer.core import TyperCommand
 
 from tendonfmu.commands.console import DASH, PRINTED
 from tendonfmu.errors import InputError
-from tendonfmu.options import Number, Option, Options, Several
+from tendonfmu.options import Option, Options
 
 REPEATED = ("--test", "--pushes")  # `--test A B` means `--test A --test B`
 # how a file begins -> its suffix; what is none of these is a table in text
@@ -169,15 +168,11 @@ def _parameters(function: Callable[..., None], options: type[Options] | None) ->
 def _option(name: str, option: Option, default: Any) -> inspect.Parameter:
     """Make the parameter of an option."""
     values = option.values
-    item = values.item if isinstance(values, Several) else values
-    limits: dict[str, float] = {}
-    if isinstance(item, Number):
-        limits = {"min": item.least} | ({"max": item.most} if math.isfinite(item.most) else {})
-    shown = typer.Option(*option.names, metavar=option.metavar, help=option.help, **limits)  # type: ignore[arg-type]
+    shown = typer.Option(*option.names, metavar=option.metavar, help=option.help, **values.limits)  # type: ignore[arg-type]
     return inspect.Parameter(
         name,
         inspect.Parameter.KEYWORD_ONLY,
-        default=None if isinstance(values, Several) else default,
+        default=None if isinstance(default, tuple) else default,
         annotation=Annotated[values.type, shown],
     )
 

@@ -21,8 +21,7 @@ from typer.core import TyperGroup
 
 from tendonfmu.commands.command import SeveralValues, for_typer
 from tendonfmu.commands.console import BAD_INPUT, FAULT, INTERRUPTED, PRINTED, fail, leave, reader_may_leave, warn
-from tendonfmu.errors import InputWarning, refusal
-from tendonfmu.fault_report import write_fault_report
+from tendonfmu.errors import InputWarning, refusal, write_fault_report
 from tendonfmu.tasks import ended_by_signals
 
 _show_as_python = warnings.showwarning

@@ -1,4 +1,4 @@
-"""How files are written so that they appear whole or not at all."""
+"""How files are written so that they appear whole or not at all, and how temporary files are named in messages."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import tempfile
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from pathlib import Path
+from pathlib import Path, PosixPath, WindowsPath
+from typing import TYPE_CHECKING
 
 from tendonfmu.errors import InputError, OutputError
 
@@ -20,6 +21,39 @@ except ImportError:  # on Windows, where an open file could not be replaced anyw
     fcntl = None  # type: ignore[assignment]
 
 _YOUNG = 60.0  # s; a younger file may not have its lock yet
+
+
+if TYPE_CHECKING:
+    SystemPath = Path
+else:
+    SystemPath = PosixPath if os.name == "posix" else WindowsPath
+
+
+class StandIn(SystemPath):
+    """A file whose text is the name of what it stands for, so that messages name that."""
+
+    shown: str
+
+    @classmethod
+    def of(cls, file: Path, shown: str) -> StandIn:
+        """Return a file that is shown by another name."""
+        path = cls(file)
+        path.shown = shown
+        return path
+
+    def __str__(self) -> str:
+        return getattr(self, "shown", None) or super().__str__()  # a path made from this one is an ordinary one
+
+    def __fspath__(self) -> str:
+        return super().__str__()
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return StandIn.of, (Path(os.fspath(self)), str(self))
+
+
+def path_of(file: str | os.PathLike[str]) -> Path:
+    """Return a path; one that stands for something still does."""
+    return file if isinstance(file, Path) else Path(file)
 
 
 def check_output(output: Path, *inputs: Path) -> None:

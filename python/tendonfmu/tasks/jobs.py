@@ -25,8 +25,7 @@ from typing import Any
 import numpy as np
 
 import tendonfmu
-from tendonfmu.errors import InputError, InternalError, refusal
-from tendonfmu.fault_report import fault_report
+from tendonfmu.errors import InputError, InternalError, fault_report, refusal
 from tendonfmu.files import check_output_folder, whole_file
 
 ROWS = "rows"
