@@ -225,7 +225,7 @@ class Story:
             page = reporting.write_run_page(self.folder / f"{name}.html", report, table)
             self.files |= {outputs: f"the FMU's outputs over {name}.parquet", page: "the same, for a browser"}
             force = f"{result.recording.groups['tendon_force'].mean():.0f} N"
-            (joint,) = (sheet for sheet in reporting.run_sheets(table, finger.joint_names, []) if sheet.title == SHOWN)
+            (joint,) = (sheet for sheet in reporting.run_sheets(table, finger.joint_names) if sheet.title == SHOWN)
             sheets.append(replace(joint, caption=f"{SHOWN.replace('_', ' ')}, free motion at {force}"))
             lines.append(f"free motion at {force}: {result.summary}")
             headings.append(f"at {force}")

@@ -31,10 +31,8 @@ if TYPE_CHECKING:
         StandIn,
         check_output,
         check_output_folder,
-        in_use,
         is_about,
         path_of,
-        remove_left_behind,
         whole_file,
         write_text,
     )
