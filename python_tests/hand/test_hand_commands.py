@@ -148,15 +148,15 @@ def test_an_internal_error_of_one_finger_is_its_row(
     report = json.loads(answer.out)
     assert list(report["fingers"]) == ["ring"]
     assert report["failed"]["index"].startswith("internal error (KeyError), a fault of tendonfmu, not of its input; ")
-    assert "KeyError: 'no index'" in Path("out/index/tendonfmu-error.txt").read_text()
-    assert "please send the report out/index/tendonfmu-error.txt" in words(Path("out/hand.html"))
+    assert "KeyError: 'no index'" in Path("out/tendonfmu-error-index.txt").read_text()
+    assert "please send the report out/tendonfmu-error-index.txt" in words(Path("out/hand.html"))
     broken.add("ring")
     answer = call(*command, "--kinematics", "3")
     assert answer.status == 3 and answer.err.count("\n") == 1 and "a fault of tendonfmu" in answer.err
     if kind:
         broken.clear()  # what failed is tried again
         assert set(json.loads(call(*command, "--kinematics", "3", "--json").out)["fingers"]) == {"index", "ring"}
-        assert not Path("out/index/tendonfmu-error.txt").exists()
+        assert not Path("out/tendonfmu-error-index.txt").exists()
 
 
 def test_a_score_counts_each_finger(tmp_path: Path, call: Call) -> None:

@@ -249,7 +249,7 @@ def _history(
             seed=options.seed,
             progress=show,
         )
-    names = diagnosis.Names(tuple(given.joint_names), tuple(given.tendon_names))
+    names = diagnosis.names_in(given.data)
     written = reporting.write_history(history, names, output)
     headings = ("cause", "place", "reference", "last", "named in", "trend")
     rows = list(reporting.rows_of_lines(history, names))

@@ -35,7 +35,7 @@ from tendonfmu.errors import InputError
 from tendonfmu.options import CalibrateOptions, DiagnoseOptions, RunOptions, ScoreOptions
 
 RECORDINGS = "recordings"  # folder of the split recordings
-FAULT = "tendonfmu-error.txt"  # in the folder of a finger: what a user sends after an internal error
+FAULT = "tendonfmu-error-{}.txt"  # what a user sends after an internal error of a finger
 HAND, SSP = "hand.json", "hand.ssp"
 OF_HAND = ("folder", "previous", "progress", "pushes", "reference", "test")  # options that no finger takes as they are
 
@@ -132,13 +132,10 @@ def score_hand(
     others = [name for name in (options.labels, options.force) if name not in (None, recorded.LABEL)]
     split = [split_parts(hand, file, others) for file in recordings]
     failed = {name: why for _, of_file in split for name, why in of_file.items()}
-
-    def given(part: HandPart) -> tuple[Any, ...]:
-        return [made[part.name] for made, _ in split], _settings(options, hand, part), figures
-
-    fingers = _Fingers(hand, pages.SCORE, score_part, given, failed, progress)
+    samples = {part.name: [made.get(part.name) for made, _ in split] for part in hand.parts}
+    fingers = _Fingers(hand, pages.SCORE, score_part, samples, failed, options, figures, progress=progress)
     totals = {key: sum(each[key] for each in fingers.reports.values()) for key in ("events", "found", "false_alarms")}
-    text = files.report_text({**fingers.head(), **totals, "fingers": fingers.reports, "failed": fingers.failed})
+    text = files.report_text({**fingers.head, **totals, "fingers": fingers.reports, "failed": fingers.failed})
     files.write_text(output, text)
     fingers.print([])
     console.print_json(lambda: text)
@@ -146,12 +143,12 @@ def score_hand(
     console.say_files(fingers.written)
 
 
-def score_part(part: HandPart, samples: Sequence[Any], options: Mapping[str, Any], figures: Path | None) -> Row:
-    """Score a finger."""
+def score_part(part: HandPart, samples: Sequence[Any], options: Mapping[str, Any], folder: Path | None) -> Row:
+    """Score a finger. folder: of its figures."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ScoreWarning)  # in the result
         result = score(part.finger, samples, **options)
-    written = {} if figures is None else reporting.write_score_figures(result.scored, figures / part.name)
+    written = {} if folder is None else reporting.write_score_figures(result.scored, folder)
     report = files.finite(dict(result.report))
     # a recording of a finger has the finger's name after it, which stands before the warning already
     sentences = [sentence.replace(f":{part.name}: ", ": ") for sentence in result.warnings]
@@ -172,23 +169,13 @@ def calibrate_hand(
     for previous in options.files("previous"):
         if not is_hand(previous):
             raise InputError(f"--from {previous}: no hand; expected hand.json of an earlier calibration of the hand")
-        before = {part.name: os.path.abspath(part.finger.path) for part in read_hand(previous).parts}
+        before = {part.name: {"previous": os.path.abspath(part.finger.path)} for part in read_hand(previous).parts}
         if missing := [part.name for part in hand.parts if part.name not in before]:
             raise InputError(f"{previous}: no finger {missing[0]}; expected the fingers of {hand.path}")
     groups = {"Free motion": recordings, "Test": options.files("test"), "Pushes": options.files("pushes")}
     split, failed = _split(hand, groups, output, ("a test", "one with pushes"), (HAND, SSP, pages.PAGE))
-
-    def given(part: HandPart) -> tuple[Any, ...]:
-        return (
-            split[part.name],
-            before.get(part.name),
-            _settings(options, hand, part),
-            os.path.abspath(output / part.name),
-        )
-
-    fingers = _Fingers(
-        hand, pages.CALIBRATION, calibrate_part, given, failed, progress, options.jobs, scheduler, output
-    )
+    run: dict[str, Any] = {"progress": progress, "scheduler": scheduler, "before": before}
+    fingers = _Fingers(hand, pages.CALIBRATION, calibrate_part, split, failed, options, output, **run)
     made = {
         part.name: f"{part.name}/{calibration.FINGER}"
         if part.name in fingers.reports
@@ -198,17 +185,15 @@ def calibrate_hand(
     files.write_text(output / HAND, hand.with_descriptions(made))
     build_hand_ssp(read_hand(output / HAND), output / SSP, recordings[0])
     written = {HAND: "the hand with the calibrated descriptions", SSP: "the FMUs of all fingers as one SSP package"}
-    fingers.finish(groups, written)
+    fingers.finish(output, groups, written)
 
 
-def calibrate_part(
-    part: HandPart, given: Sequence[Sequence[str]], previous: str | None, options: Mapping[str, Any], folder: str
-) -> Row:
+def calibrate_part(part: HandPart, given: Sequence[Sequence[str]], options: Mapping[str, Any], folder: Path) -> Row:
     """Calibrate a finger and write its folder. given: free motion, tests, pushes."""
     free, tests, pushes = given
-    settings = CalibrateOptions(**options, test=tests, pushes=pushes, previous=previous)
-    calibration.write_calibration(calibration.calibrate(part.finger, free, folder, settings), Path(folder))
-    report = json.loads((Path(folder) / calibration.REPORT).read_text(encoding="utf-8"))
+    settings = CalibrateOptions(**options, test=tests, pushes=pushes)
+    calibration.write_calibration(calibration.calibrate(part.finger, free, folder, settings), folder)
+    report = json.loads((folder / calibration.REPORT).read_text(encoding="utf-8"))
     return {"report": report, "warnings": report["warnings"], "row": pages.calibration_row(part, report)}
 
 
@@ -227,36 +212,27 @@ def diagnose_hand(
     hand = read_hand(finger)
     groups = {"Recordings": recordings, "Tests": options.files("test"), "Reference": options.files("reference")}
     split, failed = _split(hand, groups, output, ("a test", "the reference"), (pages.PAGE,))
-
-    def given(part: HandPart) -> tuple[Any, ...]:
-        return split[part.name], _settings(options, hand, part), os.path.abspath(output / part.name)
-
     kind, function = (pages.HISTORY, follow_part) if history else (pages.DIAGNOSIS, diagnose_part)
-    _Fingers(hand, kind, function, given, failed, progress, options.jobs, scheduler, output).finish(groups, {})
+    run: dict[str, Any] = {"progress": progress, "scheduler": scheduler}
+    _Fingers(hand, kind, function, split, failed, options, output, **run).finish(output, groups, {})
 
 
-def diagnose_part(part: HandPart, given: Sequence[Sequence[str]], options: Mapping[str, Any], folder: str) -> Row:
+def diagnose_part(part: HandPart, given: Sequence[Sequence[str]], options: Mapping[str, Any], folder: Path) -> Row:
     """Diagnose a finger and write its folder. given: recordings, tests, references."""
     now, tests, before = given
     found = diagnosis.diagnose(part.finger, now, tests, reference=before or None, **options)
-    reporting.write_diagnosis(found, Path(folder))
-    report = json.loads((Path(folder) / reporting.REPORT).read_text(encoding="utf-8"))
+    reporting.write_diagnosis(found, folder)
+    report = json.loads((folder / reporting.REPORT).read_text(encoding="utf-8"))
     return {"report": report, "warnings": report["warnings"], "row": pages.diagnosis_row(part, found)}
 
 
-def follow_part(part: HandPart, given: Sequence[Sequence[str]], options: Mapping[str, Any], folder: str) -> Row:
+def follow_part(part: HandPart, given: Sequence[Sequence[str]], options: Mapping[str, Any], folder: Path) -> Row:
     """Follow the changes of a finger and write its folder. given: recordings, no tests, references."""
     settings = {name: value for name, value in options.items() if name != "jobs"}
-    found = diagnosis.diagnose_history(part.finger, given[0], given[2], rows=Path(folder), **settings)
-    reporting.write_history(found, pages.names_of(part), Path(folder))
+    found = diagnosis.diagnose_history(part.finger, given[0], given[2], rows=folder, **settings)
+    reporting.write_history(found, diagnosis.names_in(part.finger.data), folder)
     report = files.finite(reporting.history_report(found))
     return {"report": report, "warnings": [], "row": pages.history_row(part, found)}
-
-
-def _settings(options: CalibrateOptions | DiagnoseOptions | ScoreOptions, hand: Hand, part: HandPart) -> dict[str, Any]:
-    """Return the options for a finger, with its share of the cores."""
-    given = options.without(*OF_HAND) | {"kinematics": part.kinematics(options.kinematics)}
-    return given | ({"jobs": max(1, given["jobs"] // len(hand.parts))} if "jobs" in given else {})
 
 
 # --- all fingers ------------------------------------------------------------------------------------------------------
@@ -269,27 +245,22 @@ def _split(
     first, second, third = groups.values()
     estimate.check_given_once(first, second, roles[0])
     estimate.check_given_once([*first, *second], third, roles[1])
-    every = [*first, *second, *third]
-    files.check_output_folder(folder, names, [*hand.files, *every])
+    files.check_output_folder(folder, names, [*hand.files, *first, *second, *third])
     return split_files(hand, list(groups.values()), folder / RECORDINGS)
 
 
 def split_files(hand: Hand, groups: Sequence[Sequence[Path]], folder: Path) -> tuple[Split, dict[str, str]]:
     """Write the recordings of the fingers, a folder for each. Return them by finger, and why a finger has none."""
-    split, failed = Split(), dict[str, str]()
-    read = [[(file.stem, *split_parts(hand, file)) for file in group] for group in groups]
-    for _, _, reasons in itertools.chain(*read):
+    split: Split = {part.name: [[] for _ in groups] for part in hand.parts}
+    failed, taken = dict[str, str](), set[str]()
+    for k, file in ((k, file) for k, group in enumerate(groups) for file in group):
+        made, reasons = split_parts(hand, file)
         failed = reasons | failed
-    for part in (part.name for part in hand.parts if part.name not in failed):
-        taken: set[str] = set()
-        split[part] = []
-        for group in read:
-            split[part].append([])
-            for stem, made, _ in group:
-                names = itertools.chain([stem], (f"{stem}_{k}" for k in itertools.count(2)))
-                name = next(name for name in names if name not in taken)
-                taken.add(name)
-                split[part][-1].append(_written(made[part], folder / part / f"{name}.parquet"))
+        names = itertools.chain([file.stem], (f"{file.stem}_{number}" for number in itertools.count(2)))
+        name = next(name for name in names if name not in taken)
+        taken.add(name)
+        for part, recording in made.items():
+            split[part][k].append(_written(recording, folder / part / f"{name}.parquet"))
     return split, failed
 
 
@@ -308,7 +279,7 @@ def _written(recording: recorded.Recording, target: Path) -> str:
 class _Fingers:
     """What comes out of a function that is called for every finger that has recordings, here or on workers.
 
-    folder: that of the results, with one of each finger.
+    folder: that of the results, with one of each finger. before: further options of each finger.
     """
 
     def __init__(
@@ -316,19 +287,31 @@ class _Fingers:
         hand: Hand,
         kind: pages.Kind,
         function: Callable[..., Row],
-        given: Callable[[HandPart], tuple[Any, ...]],
+        split: Mapping[str, Sequence[Any]],
         failed: Mapping[str, str],
+        options: CalibrateOptions | DiagnoseOptions | ScoreOptions,
+        folder: Path | None,
+        *,
         progress: bool | None,
-        jobs: int = 1,
         scheduler: str | None = None,
-        folder: Path | None = None,
+        before: Mapping[str, Mapping[str, Any]] | None = None,
     ) -> None:
-        self._hand, self._kind, self._folder = hand, kind, folder
-        waiting = [tasks.Job(part.name, (part, *given(part))) for part in hand.parts if part.name not in failed]
-        several = scheduler is not None or jobs > 1
+        self.head = {"format": f"tendonfmu-hand-{kind.name}-1", "hand": hand.name}
+        self._hand, self._kind = hand, kind
+        given, several = options.without(*OF_HAND), scheduler is not None or getattr(options, "jobs", 1) > 1
+        workers = min(getattr(options, "jobs", 1), len(hand.parts))
+        if "jobs" in given:  # the share of each
+            given["jobs"] = max(1, given["jobs"] // len(hand.parts))
+
+        def job(part: HandPart) -> tasks.Job:
+            own = {**(before or {}).get(part.name, {}), "kinematics": part.kinematics(options.kinematics)}
+            place = folder and (folder / part.name if kind is pages.SCORE else folder.absolute() / part.name)
+            return tasks.Job(part.name, (part, split[part.name], given | own, place))
+
+        waiting = [job(part) for part in hand.parts if part.name not in failed]
         with (
             tempfile.TemporaryDirectory() as scratch,
-            tasks.workers_of(scheduler, min(jobs, len(hand.parts))) if several else nullcontext() as client,
+            tasks.workers_of(scheduler, workers) if several else nullcontext() as client,
             console.progress_bar("fingers", progress, total=len(hand.parts)) as show,
         ):
             tasks.run_jobs(function, waiting, Path(scratch), client, progress=show)
@@ -336,7 +319,8 @@ class _Fingers:
         done |= {name: {"name": name, "error": why, "fault": ""} for name, why in failed.items()}
         named = [row | {"error": f"{name}: {row['error']}" if row["error"] else ""} for name, row in done.items()]
         tasks.refuse_if_all_failed(named, f"{hand.path}: no finger could be done")
-        self.failed = {name: self._reason(name, row) for name, row in done.items() if row["error"]}
+        place = Path() if kind is pages.SCORE or folder is None else folder
+        self.failed = {name: _reason(name, row, place) for name, row in done.items() if row["error"]}
         rows = [pages.PartRow(*row["row"])._replace(name=name) for name, row in done.items() if not row["error"]]
         rows = sorted(pages.stand_out(rows) if kind is pages.CALIBRATION else rows, key=lambda row: -row.badness)
         self.reports = {row.name: done[row.name]["report"] for row in rows}
@@ -344,19 +328,6 @@ class _Fingers:
         self._warnings = pages.shared_warnings({name: done[name]["warnings"] for name in self.reports})
         empty = ("–",) * len(kind.headings)
         self._rows = [*rows, *(pages.PartRow("failed", -1.0, "", empty, *each) for each in self.failed.items())]
-
-    def _reason(self, name: str, row: Row) -> str:
-        """Return why a finger failed. If tendonfmu is at fault, write what is to be sent."""
-        file = Path(f"tendonfmu-error-{name}.txt") if self._folder is None else self._folder / name / FAULT
-        if row["fault"]:
-            file.parent.mkdir(parents=True, exist_ok=True)
-            files.write_text(file, row["fault"])
-        words = tasks.fault_words(row, file)
-        return words if self._folder is None else words.replace(f"{self._folder.absolute()}{os.sep}", "")
-
-    def head(self) -> dict[str, str]:
-        """Return how the report begins."""
-        return {"format": f"tendonfmu-hand-{self._kind.name}-1", "hand": self._hand.name}
 
     def print(self, lines: Sequence[str]) -> None:
         """Print the table, lines, warnings, and why a finger was left out."""
@@ -366,27 +337,27 @@ class _Fingers:
         for name, reason in self.failed.items():
             console.warn(f"{name}: left out: {reason}")
 
-    def finish(self, groups: Groups, made: Mapping[str, str]) -> None:
+    def finish(self, folder: Path, groups: Groups, made: Mapping[str, str]) -> None:
         """Write the page and print everything. made: files of the hand with their content in words."""
-        assert self._folder is not None
-        for name in self.reports:
-            (self._folder / name / FAULT).unlink(missing_ok=True)
-        own = {f"{name}/{self._kind.page}": f"the page of {name}" for name in self.reports}
-        all_files = {**made, **own}
+        for name in self.reports:  # of an earlier call
+            (folder / FAULT.format(name)).unlink(missing_ok=True)
         pages.write_hand_page(
-            self._hand,
-            self._rows,
-            self._kind,
-            self._folder,
-            recordings=groups,
-            files=all_files,
-            warnings=self._warnings,
+            self._hand, self._rows, self._kind, folder, recordings=groups, files=made, warnings=self._warnings
         )
-        written = {
-            self._folder / name: what for name, what in ({pages.PAGE: "all fingers, for a browser"} | all_files).items()
-        }
+        own = {f"{name}/{self._kind.page}": f"the page of {name}" for name in self.reports}
+        every = {pages.PAGE: "all fingers, for a browser", **made, **own}
+        written = {folder / name: what for name, what in every.items()}
         verdict = pages.verdict(self._rows)
         self.print([verdict])
         console.say_files(written)
-        report = {**self.head(), "verdict": verdict, "fingers": self.reports, "failed": self.failed}
+        report = {**self.head, "verdict": verdict, "fingers": self.reports, "failed": self.failed}
         console.print_json(lambda: report | {"files": [str(file) for file in written]})
+
+
+def _reason(name: str, row: Row, folder: Path) -> str:
+    """Return why a finger failed. If tendonfmu is at fault, write what is to be sent."""
+    file = folder / FAULT.format(name)
+    if row["fault"]:
+        folder.mkdir(parents=True, exist_ok=True)
+        files.write_text(file, row["fault"])
+    return tasks.fault_words(row, file).replace(str(folder.absolute() / RECORDINGS), RECORDINGS)

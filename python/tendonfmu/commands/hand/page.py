@@ -15,7 +15,7 @@ from markupsafe import Markup
 from tendonfmu import report as reporting
 from tendonfmu.calibration import text
 from tendonfmu.commands.hand.description import Hand, HandPart
-from tendonfmu.diagnosis import Diagnosis, History, Names, at_place, reported_causes
+from tendonfmu.diagnosis import Diagnosis, History, at_place, names_in, reported_causes
 from tendonfmu.files import counted, listed, percent, write_text
 
 PAGE = "hand.html"
@@ -86,7 +86,7 @@ def diagnosis_row(part: HandPart, found: Diagnosis) -> PartRow:
     """Say verdict, causes, error, and how much of it is beyond noise: what causes explain, and what nothing does."""
     gain, left = (0.0 if math.isnan(share) else share for share in (found.gain.value, found.unexplained.share))
     wrong = 1.0 - (1.0 - gain) * math.sqrt(max(1.0 - left, 0.0))
-    causes = [at_place(cause.title, cause.where, names_of(part)) for cause in reported_causes(found)]
+    causes = [at_place(cause.title, cause.where, names_in(part.finger.data)) for cause in reported_causes(found)]
     more = f"; and {len(causes) - 2} more" if len(causes) > 2 else ""
     error = f"{_mnm(_own(part, found.nominal.test_rms))} mN·m"
     cells = (found.verdict, ("; ".join(causes[:2]) + more) or "–", error, percent(wrong))
@@ -97,11 +97,11 @@ def diagnosis_row(part: HandPart, found: Diagnosis) -> PartRow:
 
 def history_row(part: HandPart, history: History) -> PartRow:
     """Say how many changes there are, the first of them, and which recordings were left out."""
-    count = len(history.lines)
+    count, names = len(history.lines), names_in(part.finger.data)
     worst = max((size.gain for line in history.lines for size in line.sizes), default=0.0)
     cells = (
         reporting.headline(history).rstrip("."),
-        reporting.capital(reporting.trend_sentence(history.lines[0], history, names_of(part))) if count else "–",
+        reporting.capital(reporting.trend_sentence(history.lines[0], history, names)) if count else "–",
         percent(worst) if count else "–",
         ", ".join(f"{name.rsplit('/', 1)[-1]}: {why}" for name, why in history.failed) or "none",
     )
@@ -129,11 +129,6 @@ def shared_warnings(warnings: Mapping[str, Sequence[str]]) -> list[str]:
         for sentence in sentences:
             names.setdefault(sentence, []).append(name)
     return [f"{', '.join(of_sentence)}: {sentence}" for sentence, of_sentence in names.items()]
-
-
-def names_of(part: HandPart) -> Names:
-    """Return the names of joints and tendons."""
-    return Names(tuple(part.finger.joint_names), tuple(part.finger.tendon_names))
 
 
 def _own(part: HandPart, values: Sequence[float | None]) -> float:
