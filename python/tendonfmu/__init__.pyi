@@ -12,9 +12,9 @@ from .commands.fit import FitResult as FitResult
 from .commands.fit import fit as fit
 from .commands.hand.description import Hand as Hand
 from .commands.hand.description import read_hand as read_hand
+from .commands.hand.recordings import HandRun as HandRun
+from .commands.hand.recordings import run_hand as run_hand
 from .commands.hand.recordings import split_recording as split_recording
-from .commands.hand.running import HandRun as HandRun
-from .commands.hand.running import run_hand as run_hand
 from .commands.live import Runner as Runner
 from .commands.live import Sample as Sample
 from .commands.run import RunResult as RunResult

@@ -53,115 +53,82 @@ class KinematicsSource(IntEnum):
 
 
 @dataclass(eq=False, repr=False)
-class Number:
-    """A number from `least` to `most`; both are allowed."""
+class Values:
+    """Which values an option takes."""
 
-    least: float
-    most: float = math.inf
-    whole: bool = False
-    optional: bool = False
+    type: Any  # on the command line
+    words: str
+    read: Callable[[Any], Any]  # returns a plain value, or raises ValueError
+    limits: dict[str, float] = field(default_factory=dict)  # least and most, as typer takes them
 
-    def __str__(self) -> str:
-        kind = "a whole number" if self.whole else "a number"
-        reach = f"{self.least:.16g} to {self.most:.16g}" if self.most < math.inf else f"{self.least:.16g} or more"
-        return f"{kind}, {reach}" + (", or None" if self.optional else "")
 
-    @property
-    def type(self) -> Any:
-        """Type on the command line."""
-        kind: Any = int if self.whole else float
-        return kind | None if self.optional else kind
+def number(least: float, most: float = math.inf, whole: bool = False, optional: bool = False) -> Values:
+    """Take a number from `least` to `most`; both are allowed."""
 
-    def read(self, value: Any) -> float | int | None:
-        """Return the value as a plain number. Raises ValueError if it is none of these."""
-        if value is None and self.optional:
+    def read(value: Any) -> float | int | None:
+        if value is None and optional:
             return None
-        if isinstance(value, bool) or not isinstance(value, Real) or (self.whole and not isinstance(value, Integral)):
+        if isinstance(value, bool) or not isinstance(value, Integral if whole else Real):
             raise ValueError
-        number = int(value) if isinstance(value, Integral) and self.whole else float(value)
-        if not self.least <= number <= self.most:
+        if not least <= value <= most:  # type: ignore[operator]
             raise ValueError
-        return number
+        plain: float | int = (int if whole else float)(value)  # type: ignore[call-overload]
+        return plain
+
+    kind: Any = int if whole else float
+    reach = f"{least:.16g} to {most:.16g}" if most < math.inf else f"{least:.16g} or more"
+    words = f"a {'whole ' * whole}number, {reach}{', or None' * optional}"
+    limits = {"min": least} | ({"max": most} if most < math.inf else {})
+    return Values(kind | None if optional else kind, words, read, limits)
 
 
-@dataclass(eq=False, repr=False)
-class Choice:
-    """One of several texts."""
+def choice(*texts: str) -> Values:
+    """Take one of several texts."""
 
-    texts: tuple[str, ...]
-    type: ClassVar[Any] = str
-
-    def __str__(self) -> str:
-        return " or ".join(self.texts)
-
-    def read(self, value: Any) -> str:
-        """Return the value. Raises ValueError if it is none of the texts."""
-        if not (isinstance(value, str) and value in self.texts):
+    def read(value: Any) -> str:
+        if not (isinstance(value, str) and value in texts):
             raise ValueError
         return value
 
+    return Values(str, " or ".join(texts), read)
 
-@dataclass(eq=False, repr=False)
-class Kind:
-    """A value of one of `types`; the first is that on the command line. Without `checked` whoever uses it checks."""
 
-    words: str
-    types: tuple[Any, ...]
-    optional: bool = False
-    checked: bool = True
+def kind(words: str, *types: Any, optional: bool = False) -> Values:
+    """Take a value of one of `types`; the first is that on the command line."""
 
-    def __str__(self) -> str:
-        return self.words + (" or None" if self.optional else "")
-
-    @property
-    def type(self) -> Any:
-        """Type on the command line."""
-        return self.types[0] | None if self.optional else self.types[0]
-
-    def read(self, value: Any) -> Any:
-        """Return the value. Raises ValueError if it has another type."""
-        if bool in self.types and type(value).__name__ in ("bool", "bool_"):  # of numpy, which takes 0.1 s to import
+    def read(value: Any) -> Any:
+        if bool in types and type(value).__name__ in ("bool", "bool_"):  # of numpy, which takes 0.1 s to import
             return bool(value)
-        if self.checked and not (isinstance(value, self.types) or (value is None and self.optional)):
+        if not (isinstance(value, types) or (value is None and optional)):
             raise ValueError
         return value
 
+    return Values(types[0] | None if optional else types[0], words + " or None" * optional, read)
 
-@dataclass(eq=False, repr=False)
-class Several:
-    """One value or several; on the command line an option that may be repeated."""
 
-    words: str
-    item: Kind | Number
+def several(words: str, item: Values) -> Values:
+    """Take one value or several; on the command line an option that may be repeated."""
 
-    def __str__(self) -> str:
-        return self.words
-
-    @property
-    def type(self) -> Any:
-        """Type on the command line."""
-        return list[self.item.type] | None  # type: ignore[name-defined]
-
-    def read(self, value: Any) -> Any:
-        """Return a list, or what is not checked as it is. Raises ValueError if there is anything else in the list."""
-        if isinstance(self.item, Kind) and not self.item.checked:
-            return value
+    def read(value: Any) -> Any:
         alone = isinstance(value, str | os.PathLike) or not isinstance(value, Iterable)
-        items = [self.item.read(item) for item in ([value] if alone else value)]
+        items = [item.read(each) for each in ([value] if alone else value)]
         # scikit-learn's clone wants back the very list that it passed
         unchanged = isinstance(value, list) and all(map(operator.is_, items, value))
         return value if unchanged else items
 
+    return Values(list[item.type] | None, words, read, item.limits)  # type: ignore[name-defined]
+
 
 File = str | os.PathLike[str]
-_COLUMN = Kind("the name of a column", (str,), optional=True)
-_PATH = Kind("a path", (Path, str, os.PathLike), optional=True)
-_TEXTS = Several("a text or a list of texts", Kind("a text", (str,)))
-_PATHS = Several("a path or a list of paths", Kind("a path", (Path, str, os.PathLike)))
-_RECORDING = Kind("a recording, DataFrame or file", (Path,), optional=True, checked=False)
-_RECORDINGS = Several("a recording, DataFrame or file, or a list of them", Kind("", (Path,), checked=False))
-_FUNCTION = Kind("a function", (Callable,), optional=True)
-_YES, _YES_OR_NONE = Kind("True or False", (bool,)), Kind("True, False", (bool,), optional=True)
+_COLUMN = kind("the name of a column", str, optional=True)
+_PATH = kind("a path", Path, str, os.PathLike, optional=True)
+_TEXTS = several("a text or a list of texts", kind("a text", str))
+_PATHS = several("a path or a list of paths", kind("a path", Path, str, os.PathLike))
+# who uses recordings checks them
+_RECORDING = Values(Path | None, "a recording, DataFrame or file or None", lambda given: given)
+_RECORDINGS = Values(list[Path] | None, "a recording, DataFrame or file, or a list of them", lambda given: given)
+_FUNCTION = kind("a function", Callable, optional=True)
+_YES, _YES_OR_NONE = kind("True or False", bool), kind("True, False", bool, optional=True)
 
 
 # --- an option, and the options of a command --------------------------------------------------------------------------
@@ -171,7 +138,7 @@ _YES, _YES_OR_NONE = Kind("True or False", (bool,)), Kind("True, False", (bool,)
 class Option:
     """What an option takes, and how the command line shows it."""
 
-    values: Number | Choice | Kind | Several
+    values: Values
     help: str | None = None
     metavar: str | None = None
     names: tuple[str, ...] = ()  # on the command line, where that of the field is not enough
@@ -181,10 +148,10 @@ class Option:
         """Describe the option for readers of Python: what it is, its values and its default."""
         words = re.sub(r"; may be repeated| \[default: .*\]", "", self.help or "")
         usual = re.findall(r"\[default: (.*)\]", self.help or "") or [repr(default)]
-        return f"{words[:1].upper()}{words[1:]} ({self.values}; default {usual[0]})."
+        return f"{words[:1].upper()}{words[1:]} ({self.values.words}; default {usual[0]})."
 
 
-def option(default: Any, values: Number | Choice | Kind | Several, help: str = "", **shown: Any) -> Any:
+def option(default: Any, values: Values, help: str = "", **shown: Any) -> Any:
     """Make the field of an option, which is given by its name."""
     return field(default=default, metadata={"option": Option(values, help or None, **shown)})
 
@@ -195,7 +162,11 @@ class Options:
 
     def __post_init__(self) -> None:
         for name, each in self.each().items():
-            object.__setattr__(self, name, checked(name, getattr(self, name), each.values))
+            try:
+                object.__setattr__(self, name, each.values.read(getattr(self, name)))
+            except ValueError:
+                given = _SHORT.repr(getattr(self, name))
+                raise InputError(f"{name}: {given}; expected {each.values.words}") from None
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({', '.join(f'{name}={value!r}' for name, value in vars(self).items())})"
@@ -252,14 +223,6 @@ def keywords(
     return decorate
 
 
-def checked(name: str, value: Any, values: Number | Choice | Kind | Several) -> Any:
-    """Return the value of an option as a plain one."""
-    try:
-        return values.read(value)
-    except ValueError:
-        raise InputError(f"{name}: {_SHORT.repr(value)}; expected {values}") from None
-
-
 class Configured:
     """Base of an estimator as in scikit-learn, which keeps its finger and its options."""
 
@@ -302,19 +265,19 @@ class Configured:
 
 def _kinematics() -> Any:
     words = (f"{source}: {source.name.lower().replace('_', ' ')}" for source in KinematicsSource)
-    return option(1, Number(1, 3, whole=True), ", ".join(words), metavar="1|2|3")
+    return option(1, number(1, 3, whole=True), ", ".join(words), metavar="1|2|3")
 
 
 def _seed() -> Any:
-    return option(0, Number(0, 2**53, whole=True), "seed of the random numbers", metavar="N")
+    return option(0, number(0, 2**53, whole=True), "seed of the random numbers", metavar="N")
 
 
 def _jobs() -> Any:
-    return option(1, Number(1, 1024, whole=True), "processor cores to use; no effect on the result", metavar="N")
+    return option(1, number(1, 1024, whole=True), "processor cores to use; no effect on the result", metavar="N")
 
 
 def _false_alarms() -> Any:
-    return option(6.0, Number(1e-3, 3600.0), "false alarms an hour in other free motion, at most", metavar="RATE")
+    return option(6.0, number(1e-3, 3600.0), "false alarms an hour in other free motion, at most", metavar="RATE")
 
 
 def _path(help: str, **shown: Any) -> Any:
@@ -342,10 +305,10 @@ class BuildOptions(Options):
     )
     ssv: Sequence[File] = option((), _PATHS, "parameter set that the FMU carries; may be repeated", metavar="SET.ssv")
     binaries: File | None = _path("folder of binaries by FMI platform [default: those installed]", metavar="DIR")
-    fmi: int = option(2, Number(2, 3, whole=True), "version of FMI; 3: forces and torques as arrays", metavar="2|3")
+    fmi: int = option(2, number(2, 3, whole=True), "version of FMI; 3: forces and torques as arrays", metavar="2|3")
     sample_at: str = option(
         "begin",
-        Choice(("begin", "end")),
+        choice("begin", "end"),
         "end: for masters that hand over the inputs of a step's end",
         metavar="begin|end",
     )
@@ -366,8 +329,8 @@ class RunOptions(Options):
 class ExciteOptions(Options):
     """Options of `excite`."""
 
-    duration: float = option(400.0, Number(1.0, 1e5), "per pretension, in all with --alternate", metavar="SECONDS")
-    max_speed: float = option(1.0, Number(1e-3, 100.0), "limit for every joint", metavar="RAD/S")
+    duration: float = option(400.0, number(1.0, 1e5), "per pretension, in all with --alternate", metavar="SECONDS")
+    max_speed: float = option(1.0, number(1e-3, 100.0), "limit for every joint", metavar="RAD/S")
     range_: Sequence[str] = option(
         (),
         _TEXTS,
@@ -377,22 +340,22 @@ class ExciteOptions(Options):
     )
     pretension: Sequence[float] = option(
         (),
-        Several("a number or a list of numbers, 0.001 to 1000000", Number(1e-3, 1e6)),
+        several("a number or a list of numbers, 0.001 to 1000000", number(1e-3, 1e6)),
         "mean tendon force; may be repeated [default: 10]",
         metavar="NEWTON",
     )
     alternate: float | None = option(
-        None, Number(1.0, optional=True), "time between changes of the pretension", metavar="SECONDS"
+        None, number(1.0, optional=True), "time between changes of the pretension", metavar="SECONDS"
     )
     vary_tension: str | None = option(
         None,
-        Kind("a text", (str,), optional=True),
+        kind("a text", str, optional=True),
         "in N; vary the tension of each tendon in turn, without a pretension",
         metavar="LOW:HIGH",
     )
-    vary_every: float = option(10.0, Number(2.0, 1e5), "time between changes of the tensions", metavar="SECONDS")
-    max_acceleration: float = option(10.0, Number(0.1, 1e4), "limit for every joint", metavar="RAD/S²")
-    rate: float = option(100.0, Number(20.0, 10000.0), "rows per second", metavar="HZ")
+    vary_every: float = option(10.0, number(2.0, 1e5), "time between changes of the tensions", metavar="SECONDS")
+    max_acceleration: float = option(10.0, number(0.1, 1e4), "limit for every joint", metavar="RAD/S²")
+    rate: float = option(100.0, number(20.0, 10000.0), "rows per second", metavar="HZ")
     seed: int = _seed()
 
 
@@ -400,9 +363,9 @@ class ExciteOptions(Options):
 class FitOptions(Options):
     """Options of `fit`."""
 
-    method: str = option("batch", Choice(("batch", "ekf")), "maximum likelihood or Kalman filter", metavar="batch|ekf")
-    holdout: float = option(0.0, Number(0.0, 0.9), "share of the time not used in the fit", metavar="SHARE")
-    holdout_block: float = option(10.0, Number(1.0), "longest block left out", metavar="SECONDS")
+    method: str = option("batch", choice("batch", "ekf"), "maximum likelihood or Kalman filter", metavar="batch|ekf")
+    holdout: float = option(0.0, number(0.0, 0.9), "share of the time not used in the fit", metavar="SHARE")
+    holdout_block: float = option(10.0, number(1.0), "longest block left out", metavar="SECONDS")
     kinematics: int = _kinematics()
     routing: bool = option(
         False, _YES, "first learn moment arms, stiffness and zeros, by joint_position", names=("--routing",)
@@ -418,7 +381,7 @@ class FitOptions(Options):
     )
     prior: float | None = option(
         None,
-        Number(1e-6, 1e6, optional=True),
+        number(1e-6, 1e6, optional=True),
         "by how much the given numbers are off / expected magnitude [default: learned from the data]",
         metavar="RATIO",
     )
@@ -435,10 +398,10 @@ class FitOptions(Options):
         names=("--effective-samples/--no-effective-samples",),
     )
     passes: int | None = option(
-        None, Number(1, whole=True, optional=True), "most passes over the data [default: 60; ekf: 2]", metavar="N"
+        None, number(1, whole=True, optional=True), "most passes over the data [default: 60; ekf: 2]", metavar="N"
     )
-    tolerance: float = option(0.3, Number(1e-9, 0.5), "batch: last step, in standard errors", metavar="SIZE")
-    drift: float = option(0.0, Number(0.0, 1.0), "ekf: relative variance of the numbers per s", metavar="RATE")
+    tolerance: float = option(0.3, number(1e-9, 0.5), "batch: last step, in standard errors", metavar="SIZE")
+    drift: float = option(0.0, number(0.0, 1.0), "ekf: relative variance of the numbers per s", metavar="RATE")
     progress: Callable[[Any], bool | None] | None = _progress("called with each `FitProgress`; returns False to stop")
 
     def __post_init__(self) -> None:
@@ -485,7 +448,7 @@ class DiagnoseOptions(Options):
     )
     kinematics: int = _kinematics()
     least_gain: float = option(
-        0.03, Number(0.0, 0.5), "least drop of the rms on unseen data for a cause", metavar="SHARE"
+        0.03, number(0.0, 0.5), "least drop of the rms on unseen data for a cause", metavar="SHARE"
     )
     seed: int = _seed()
     jobs: int = _jobs()
@@ -498,10 +461,10 @@ class TuneOptions(Options):
 
     false_alarms_per_hour: float = _false_alarms()
     method: str = option(
-        "bands", Choice(("bands", "paper")), "contact.method; paper is the rule of the paper", metavar="bands|paper"
+        "bands", choice("bands", "paper"), "contact.method; paper is the rule of the paper", metavar="bands|paper"
     )
     bias_time: float | None = option(
-        None, Number(1e-3, 1e4, optional=True), "time constant of the bias [default: unchanged]", metavar="SECONDS"
+        None, number(1e-3, 1e4, optional=True), "time constant of the bias [default: unchanged]", metavar="SECONDS"
     )
     kinematics: int = _kinematics()
     progress: Callable[[int, int], None] | None = _progress("called with steps done and steps")

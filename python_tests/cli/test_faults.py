@@ -20,8 +20,7 @@ from command import Call
 from fmu_binary import FINGER
 from repository_paths import ROOT
 from tendonfmu.commands.console import reader_may_leave
-from tendonfmu.errors import InputError, InternalError, OutputError, line_of, own_fault
-from tendonfmu.fault_report import write_fault_report
+from tendonfmu.errors import InputError, InternalError, OutputError, line_of, own_fault, write_fault_report
 from tendonfmu.files.writing import whole_file
 from tendonfmu.model import native
 

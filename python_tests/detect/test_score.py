@@ -115,7 +115,7 @@ def test_labels_force_and_recordings_without_a_reference(call: Call, pushes: Tab
     answer = call("score", INDEX, labelled, plain, "-o", "s.json", *options)
     report = report_of(answer)
     assert json.loads(answer.out) == report
-    assert shown_in(Path("fig")) == ["contacts", "events", "roc", "delays"]
+    assert shown_in(Path("fig")) == ["contacts", "events", "roc"]
     first, second = report["recordings"]
     assert (report["labels"], report["events"], first["events"], second["events"]) == ("touched", 8, 4, 4)
     assert (first["external_torque"], second["external_torque"]) == (True, False)

@@ -52,8 +52,8 @@ def everything(name: str = "before it sees the sample", **labels: str) -> Panel:
         band(X, X - 1, X + 1, name),
         bars(X, X - 1, X + 1, "95 % interval"),
         curve(X, X, name),
-        dots(X, X, texts=tuple("abcde")),
-        dots(X, X, "floor", GREEN, ring=True),
+        dots(X, X),
+        dots(X, X, "floor", GREEN),
         stripes([(2.0, 3.0)], "held out", ORANGE, 0.16),
         mark(4.0),
     )
@@ -70,8 +70,7 @@ MATRIX = panel(
 )
 LOGARITHMIC = over_time(curve(X[1:], X[1:]), x_limits=(0.1, 10.0), log_x=True, log_y=True)
 NEAR = over_time(curve(X, X), bars(X, X - 1, X + 1), x_limits=None, near_x=0.1, near_y=0.2)
-LYING = bars(np.arange(2.0), np.array([1.0, 2.0]), np.array([3.0, 4.0]), lying=True)
-ROWS = over_time(LYING, lane([(1.0, 2.0), (5.0, 6.0)], 1, "contact", ORANGE), rows=("a", "b"))
+ROWS = over_time(dots([1.0, 3.0], [0.0, 1.0]), lane([(1.0, 2.0), (5.0, 6.0)], 1, "contact", ORANGE), rows=("a", "b"))
 KINDS = (everything(), MATRIX, LOGARITHMIC, NEAR, ROWS)
 
 
@@ -126,7 +125,7 @@ def test_keys_are_what_is_drawn() -> None:
     sheet = Sheet("", "", "", [everything("all"), unknown, everything("all")])
     shapes = {meaning: shape for shape, _, _, meaning in sheet.keys}
     assert [(shape, meaning) for shape, _, _, meaning in sheet.keys] == [
-        ("ring", "floor"),
+        ("dot", "floor"),
         ("line", "95 % interval"),
         ("line", "all"),
         ("patch", "where it was"),
@@ -158,7 +157,7 @@ def test_many_points_are_thinned_and_none_that_stands_out_is_lost() -> None:
 def test_names_are_text() -> None:
     hostile = "<script>alert('x')</script><b>$\\frac{指"
     named = everything(hostile, x_label=f"{hostile} ({hostile})", y_label=f"{hostile} ({hostile})")
-    rows = over_time(LYING, rows=(hostile, "b"))
+    rows = over_time(dots([1.0], [0.0]), rows=(hostile, "b"))
     text = figures_json([named, rows])
     assert "<" not in text
     figures = json.dumps(json.loads(text)["figures"])

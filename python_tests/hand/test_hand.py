@@ -14,7 +14,7 @@ import pytest
 from command import Call
 from small_hand import FINGERS, write_worn_hand, write_wrist_hand
 from tendonfmu.commands.command import is_hand
-from tendonfmu.commands.hand.description import read_hand, with_descriptions
+from tendonfmu.commands.hand.description import read_hand
 from tendonfmu.errors import InputError
 from tendonfmu.model.description import read_finger
 
@@ -32,19 +32,23 @@ def hand_file(tmp_path: Path) -> Path:
 def test_a_hand_has_its_fingers_and_their_columns(hand_file: Path) -> None:
     hand = read_hand(hand_file)
     assert [part.name for part in hand.parts] == list(FINGERS) and hand.wrist is None
-    assert hand.fingers[1].columns["tendon_force[2]"] == "ring_tendon_force[2]"
+    assert [part.prefix for part in hand.parts] == ["index_", "ring_"]
     assert hand.summary()[0] == "right_hand: a valid hand of 2 fingers"
     assert is_hand(hand_file) and not is_hand(hand_file.with_name("index.json"))
-    before, after = json.loads(hand_file.read_text()), json.loads(with_descriptions(hand, {"ring": "worn/finger.json"}))
+    before, after = json.loads(hand_file.read_text()), json.loads(hand.with_descriptions({"ring": "worn/finger.json"}))
     before["fingers"][1]["description"] = "worn/finger.json"
     assert after == before
 
 
 def test_without_columns_the_prefix_is_the_name_and_a_point(tmp_path: Path) -> None:
     hand = read_hand(write_wrist_hand(tmp_path, "tendons")[0])
-    assert hand.fingers[0].columns["tendon_position[4]"] == "index.tendon_position[4]"
-    assert [part.name for part in hand.parts] == [*FINGERS, "wrist"] and hand.wrist_joints == 1
-    assert [hand.kinematics(part, 1) for part in hand.parts] == [2, 2, 1] and hand.kinematics(hand.parts[0], 3) == 3
+    assert [part.prefix for part in hand.parts] == ["index.", "ring.", "wrist."]
+    assert [part.name for part in hand.parts] == [*FINGERS, "wrist"] and [part.shared for part in hand.parts] == [
+        1,
+        1,
+        0,
+    ]
+    assert [part.kinematics(1) for part in hand.parts] == [2, 2, 1] and hand.parts[0].kinematics(3) == 3
 
 
 # --- refusals ---------------------------------------------------------------------------------------------------------
@@ -54,33 +58,16 @@ def set_columns(data: dict[str, Any], columns: Any) -> None:
     data["fingers"][1]["columns"] = columns
 
 
-LISTED = {f"tendon_{kind}[{i}]": f"{kind}_{i}" for kind in ("force", "position") for i in (1, 2)}
 # what is changed; the words of the refusal; whether the schema, which sees neither files nor names, refuses it too
 REFUSED: dict[str, tuple[Change, str, bool]] = {
-    "one column for two": (
+    "one prefix for two": (
         lambda data: set_columns(data, "index_"),
-        "fingers[2].columns: column index_tendon_force[1] is that of index already; expected columns of its own, such "
-        'as "columns": "ring."',
+        'fingers[2].columns = "index_": expected a prefix of its own, since that of index is the same',
         False,
     ),
-    "one listed column for two": (
-        lambda data: set_columns(data, LISTED | {"tendon_force[2]": "index_tendon_force[1]"}),
-        "fingers[2].columns: column index_tendon_force[1] is that of index already",
-        False,
-    ),
-    "one column twice": (
-        lambda data: set_columns(data, LISTED | {"tendon_force[2]": "force_1"}),
-        'fingers[2].columns.tendon_force[1] = "force_1": expected a column that is not used for anything else',
-        False,
-    ),
-    "a tendon without a column": (
-        lambda data: set_columns(data, {"tendon_force[1]": "f", "tendon_position[1]": "x"}),
-        "fingers[2].columns: no tendon_force[2]; expected one for each of the 2 tendons",
-        False,
-    ),
-    "a column of no group": (
-        lambda data: set_columns(data, LISTED | {"tendon_length[1]": "l"}),
-        'fingers[2].columns.tendon_length[1] = "l": unknown key; expected one of tendon_force[1], ',
+    "columns one by one": (
+        lambda data: set_columns(data, {"tendon_force[1]": "f"}),
+        'fingers[2].columns = {"tendon_force[1]": "f"}: expected the prefix of its columns, such as index_',
         True,
     ),
     "an unknown key": (lambda data: data.update(arm=1), "arm = 1: unknown key; expected one of format, name", True),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +15,14 @@ from command import Call
 from real_browser import Elements
 from small_hand import FINGERS, worn_columns, write_worn_hand
 from tendonfmu import diagnosis
-from tendonfmu.commands.hand.outcome import split_files
+from tendonfmu.commands.hand.commands import split_files
 from tendonfmu.commands.hand.page import (
     CALIBRATION,
     PAGE,
-    PartResult,
-    calibration_rows,
+    PartRow,
+    calibration_row,
+    stand_out,
+    verdict,
     write_hand_page,
 )
 
@@ -49,28 +50,26 @@ def hand(tmp_path: Path) -> tf.Hand:
     return tf.read_hand(write_worn_hand(tmp_path)["hand"])
 
 
-def results(hand: tf.Hand, reports: Mapping[str, Any]) -> list[PartResult]:
-    return [
-        PartResult(part, *((reports[part.name], "") if part.name in reports else (None, "no motion")))
-        for part in hand.parts
-    ]
-
-
-def test_the_worst_finger_is_first_and_one_that_failed_last(hand: tf.Hand, tmp_path: Path) -> None:
+def test_the_worst_finger_is_named_and_one_that_failed(hand: tf.Hand, tmp_path: Path) -> None:
     hand.path.write_text(hand.path.read_text().replace("right_hand", "<script>"))
     hand = tf.read_hand(hand.path)
-    for reports, expected in (
-        ({"index": calibration(1.0), "ring": calibration(3.0)}, [("ring", "fine"), ("index", "fine")]),
-        ({"index": calibration(5.0), "ring": calibration(1.0)}, [("index", "bad"), ("ring", "fine")]),
-        ({"ring": calibration(1.0)}, [("ring", "fine"), ("index", "failed")]),
+    for errors, tones, words_of in (
+        ((1.0, 3.0), ("fine", "fine"), "No finger of 2 stands out."),
+        ((1.0, 1.2, 3.0), ("fine", "fine", "doubt"), "f2 is the worst: 3.00 mN·m are left on unseen motion."),
+        ((5.0, 1.0), ("bad", "fine"), "f0 is the worst: 5.00 mN·m are left on unseen motion."),
+        ((1.0,), ("fine",), "No finger of 1 stands out. 1 finger left out: ring."),
     ):
-        rows = calibration_rows(hand, results(hand, reports))
-        assert [(row.name, row.tone) for row in rows] == expected
+        rows = [
+            calibration_row(hand.parts[0], calibration(each))._replace(name=f"f{k}") for k, each in enumerate(errors)
+        ]
+        rows = stand_out(rows)
+        assert tuple(row.tone for row in rows) == tones
+        rows += [PartRow("failed", -1.0, "", ("–",) * 4, "ring", "no motion")] if len(errors) == 1 else []
+        assert verdict(rows) == words_of
         write_hand_page(hand, rows, CALIBRATION, tmp_path, recordings={}, files={})
         page = (tmp_path / PAGE).read_text("utf-8")
-        assert "<script>" not in page and ('href="index/calibration.html"' in page) == ("index" in reports)
-        if "index" not in reports:
-            assert "index was left out: no motion" in words(tmp_path / PAGE)
+        assert "<script>" not in page and 'href="f0/calibration.html"' in page and "ring/" not in page
+        assert ("ring was left out: no motion" in words(tmp_path / PAGE)) == (len(errors) == 1)
 
 
 # --- splitting --------------------------------------------------------------------------------------------------------
@@ -83,16 +82,16 @@ def test_split_files_keep_their_time_if_nothing_changed(tmp_path: Path) -> None:
     shutil.copy(files["monday"], tmp_path / "other" / "monday.parquet")
     hand, out = tf.read_hand(files["hand"]), tmp_path / "out"
     groups = [[files["monday"]], [tmp_path / "other" / "monday.parquet"]]
-    (first, second), failed = split_files(hand, groups, out)
-    assert failed == {}
-    assert [Path(each[0]).name for each in (first["ring"], second["ring"])] == [
-        "monday.parquet",
-        "monday_2.parquet",
+    split, failed = split_files(hand, groups, out)
+    assert failed == {} and list(split) == list(FINGERS)
+    assert [[Path(each).name for each in files] for files in split["ring"]] == [
+        ["monday.parquet"],
+        ["monday_2.parquet"],
     ]
     before = {file: file.stat().st_mtime_ns for file in out.rglob("*.parquet")}
     split_files(hand, groups, out)
     assert len(before) == 4 and {file: file.stat().st_mtime_ns for file in before} == before
-    read = tf.read_recording(first["ring"][0])
+    read = tf.read_recording(split["ring"][0][0])
     np.testing.assert_array_equal(read["tendon_force[1]"], worn_columns(1, seconds=2.0)["ring_tendon_force[1]"])
 
 
@@ -120,8 +119,8 @@ def test_a_finger_without_columns_is_its_row(tmp_path: Path, call: Call) -> None
     columns = worn_columns(1, seconds=4.0)
     files = write_worn_hand(tmp_path, day={name: column for name, column in columns.items() if "ring" not in name})
     answer = call("score", files["hand"], files["day"], "-o", "score.json", "--kinematics", "3")
-    wanted = "no column ring_tendon_force[1]; expected 2 columns with tendon_force of ring, in N"
-    assert answer.status == 0 and f"warning: ring: left out: {files['day']}: {wanted}" in answer.err
+    wanted = "no column tendon_force[1]; expected one tendon_force[i] per tendon, in N"
+    assert answer.status == 0 and f"warning: ring: left out: {files['day']}:ring: {wanted}" in answer.err
     assert list(json.loads(Path("score.json").read_text())["failed"]) == ["ring"]
     answer = call("check", files["hand"], files["day"], "--json")
     assert answer.status == 1 and f"ring: recordings do not belong to {files['hand']}" in answer.err
@@ -137,9 +136,8 @@ def test_an_internal_error_of_one_finger_is_its_row(
     real, broken = getattr(diagnosis, name), {"index"}
 
     def breaks(finger: Any, *given: Any, **options: Any) -> Any:
-        stem = finger.path.stem if kind else Path(finger).stem
-        if stem in broken:
-            raise KeyError(f"no {stem}")
+        if finger.path.stem in broken:
+            raise KeyError(f"no {finger.path.stem}")
         return real(finger, *given, **options)
 
     monkeypatch.setattr(diagnosis, name, breaks)
@@ -150,15 +148,15 @@ def test_an_internal_error_of_one_finger_is_its_row(
     report = json.loads(answer.out)
     assert list(report["fingers"]) == ["ring"]
     assert report["failed"]["index"].startswith("internal error (KeyError), a fault of tendonfmu, not of its input; ")
-    assert "KeyError: 'no index'" in Path("out/index/tendonfmu-error.txt").read_text()
-    assert "please send the report out/index/tendonfmu-error.txt" in words(Path("out/hand.html"))
+    assert "KeyError: 'no index'" in Path("out/tendonfmu-error-index.txt").read_text()
+    assert "please send the report out/tendonfmu-error-index.txt" in words(Path("out/hand.html"))
     broken.add("ring")
     answer = call(*command, "--kinematics", "3")
     assert answer.status == 3 and answer.err.count("\n") == 1 and "a fault of tendonfmu" in answer.err
     if kind:
         broken.clear()  # what failed is tried again
         assert set(json.loads(call(*command, "--kinematics", "3", "--json").out)["fingers"]) == {"index", "ring"}
-        assert not Path("out/index/tendonfmu-error.txt").exists()
+        assert not Path("out/tendonfmu-error-index.txt").exists()
 
 
 def test_a_score_counts_each_finger(tmp_path: Path, call: Call) -> None:

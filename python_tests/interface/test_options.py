@@ -47,7 +47,7 @@ def test_a_function_has_the_options_of_its_command(
     assert re.findall(r"^\w+$", listed, re.MULTILINE)[2:] == list(signature)
     for name, option in of_command.each().items():
         assert re.search(
-            rf"^{name}\n    [A-Z1].* \({re.escape(str(option.values))}; default .*\)\.$", listed, re.MULTILINE
+            rf"^{name}\n    [A-Z1].* \({re.escape(option.values.words)}; default .*\)\.$", listed, re.MULTILINE
         )
 
 

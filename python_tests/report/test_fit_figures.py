@@ -16,10 +16,10 @@ from tendonfmu.model.friction_places import Effect, effects
 from tendonfmu.report.fit_figures import (
     SHOWN,
     correlation,
+    law_sheets,
     strongest_pairs,
     torque_sheets,
 )
-from tendonfmu.report.fit_laws import law_sheets
 from tendonfmu.report.numbers import rms
 
 MILLI = 1e3

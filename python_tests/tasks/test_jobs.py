@@ -13,7 +13,7 @@ import some_jobs
 from dask_on_loopback import dask_processes
 from tendonfmu.errors import InputError, InternalError
 from tendonfmu.tasks import jobs as engine
-from tendonfmu.tasks.jobs import Job, fault_words, refuse_if_all_failed, rows_of, run_jobs, waiting_jobs, workers_of
+from tendonfmu.tasks.jobs import Job, fault_words, refuse_if_all_failed, rows_of, run_jobs, workers_of
 
 
 def noting(count: int, seconds: float, log: Path) -> list[Job]:
@@ -27,10 +27,7 @@ def begun(log: Path) -> list[int]:
 def test_jobs_are_resumed_and_a_failure_is_a_row(tmp_path: Path) -> None:
     some = [Job(str(k), (k,)) for k in range(4)]
     assert run_jobs(some_jobs.fail, some[:3], tmp_path) == 3
-    assert [job.name for job in waiting_jobs(some, tmp_path, keep_failed=True)] == ["3"]
-    assert [job.name for job in waiting_jobs(some, tmp_path)] == ["2", "3"]
-    assert run_jobs(some_jobs.fail, some, tmp_path, keep_failed=True) == 1
-    assert run_jobs(some_jobs.fail, some, tmp_path) == 1
+    assert run_jobs(some_jobs.fail, some, tmp_path) == 2  # the third again, and the fourth
     rows = rows_of(some, tmp_path)
     assert [row["name"] for row in rows] == ["0", "1", "2", "3"]
     assert [row["error"] for row in rows] == ["", "", "ValueError: two is refused", ""]
@@ -68,12 +65,6 @@ def test_a_row_says_whose_fault_it_is(tmp_path: Path) -> None:
     with pytest.raises(InternalError, match="Traceback"):
         refuse_if_all_failed([broken], "none could be done")
     refuse_if_all_failed([broken, {"error": ""}], "none could be done")
-
-
-def test_no_job_begins_after_the_time(tmp_path: Path) -> None:
-    log = tmp_path / "log"
-    assert run_jobs(some_jobs.note, noting(5, 0.2, log), tmp_path / "out", stop_after=0.5) == 3
-    assert begun(log) == [0, 1, 2]
 
 
 def test_a_scheduler_that_is_not_there_is_refused_by_its_address(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -141,7 +132,5 @@ def test_a_scheduler_that_dies_is_an_error_and_the_rest_is_resumed(tmp_path: Pat
 
         with pytest.raises(InputError, match="the dask scheduler was lost"):
             run_jobs(some_jobs.note, jobs, output, client, progress=kill_after_two)
-    left = len(waiting_jobs(jobs, output))
-    assert 1 <= left <= 6
-    assert run_jobs(some_jobs.note, jobs, output) == left
+    assert 1 <= run_jobs(some_jobs.note, jobs, output) <= 6
     assert [row["number"] for row in rows_of(jobs, output)] == list(range(8))

@@ -15,7 +15,7 @@ from tendonfmu.diagnosis import Diagnosis, Event
 from tendonfmu.fmu import run_model
 from tendonfmu.model import Finger
 from tendonfmu.recordings import FitRecording, Held, Recording, at_rows, flagged_stretches, held_out_blocks, rms
-from tendonfmu.report import MotionShown, capital, gain_text, names_of
+from tendonfmu.report import MotionShown, capital, names_of, percent_interval
 from tendonfmu.statistics import intervals
 
 # --- on motion that nothing was chosen on -----------------------------------------------------------------------------
@@ -171,7 +171,7 @@ def structure_of(found: Diagnosis) -> dict[str, Any]:
                 "title": capital(cause.title),
                 "place": capital(names.places(cause)),
                 "size": cause.size,
-                "gain": gain_text(found, cause),
+                "gain": percent_interval(cause.gain),
                 "explanation": cause.explanation,
             }
             for cause in found.causes

@@ -19,7 +19,6 @@ from tendonfmu.report import (
     friction_figure,
     motion_sheet,
     push_sheet,
-    pushes_sheet,
     render,
     rounded,
     together,
@@ -204,10 +203,7 @@ def size_rows(report: Report) -> list[Row]:
 
 def cause_rows(report: Report) -> list[Row]:
     """Return a row per cause: title, place, size, gain."""
-    return [
-        (each["title"], each["place"], each["size"], each["gain"].split("\u00a0%")[0] + "\u00a0%")
-        for each in report["structure"]["causes"]
-    ]
+    return [(each["title"], each["place"], each["size"], each["gain"]) for each in report["structure"]["causes"]]
 
 
 def recording_rows(report: Report) -> list[Row]:
@@ -331,13 +327,11 @@ def _write_diagnosis(calibration: Calibration, folder: Path) -> None:
 
 
 def sheets(calibration: Calibration) -> Iterator[Sheet]:
-    """Yield the figures of the page: motion, then pushes."""
+    """Yield the figures of the page: motion, then a push."""
     report = calibration.report
     yield motion_sheet(calibration.shown, report["joints"], MODELS[_first(report)])
     if calibration.push is not None:
         yield push_sheet(calibration.push)
-    if pushed := report["pushes"] and report["pushes"]["list"]:
-        yield pushes_sheet(pushed, report["pushes"]["false_alarm_list"])
 
 
 def calibration_page(calibration: Calibration) -> str:

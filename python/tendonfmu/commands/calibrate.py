@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from tendonfmu import calibration
 from tendonfmu import report as reporting
 from tendonfmu.commands.command import ExtendedFinger, FreeAtPretensions, Progress, Scheduler, command, output_option
-from tendonfmu.commands.console import INTERRUPTED, Bar, fail, print_json, print_result, say, say_files
-from tendonfmu.commands.result import Result
+from tendonfmu.commands.console import INTERRUPTED, Bar, Result, fail, print_json, print_result, say, say_files
 from tendonfmu.errors import InputError
 from tendonfmu.options import CalibrateOptions, RecordingSources, keywords
 

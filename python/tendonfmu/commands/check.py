@@ -18,6 +18,7 @@ from tendonfmu.options import RecordingSources
 
 if TYPE_CHECKING:
     from tendonfmu.model import Finding, Finger, FingerSource
+    from tendonfmu.recordings import Recording
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -126,14 +127,18 @@ def check_files(
 
 def _check_recordings(finger: Finger, paths: list[Path], progress: bool | None) -> list[dict[str, Any]]:
     """Print for each recording whether it belongs to the finger, and return the reports on them."""
-    reports, lines = [], []
+    read = []
     with progress_bar("recordings", progress if paths else False, total=len(paths)) as show_progress:
         for number, file in enumerate(paths, start=1):
-            recording = recorded.read_recording(file)
-            findings = recorded.belongs(finger, [recording])
-            reports.append(recorded.recording_report(recording, findings))
-            lines += [reports[-1]["verdict"], *(f"{finding.severity}: {finding.line()}" for finding in findings)]
+            read.append(recorded.read_recording(file))
             show_progress(number)
-    for line in lines:
+    return [show_whether_it_belongs(finger, recording) for recording in read]
+
+
+def show_whether_it_belongs(finger: Finger, recording: Recording) -> dict[str, Any]:
+    """Print whether a recording belongs to a finger, and return the report on it."""
+    findings = recorded.belongs(finger, [recording])
+    report = recorded.recording_report(recording, findings)
+    for line in (report["verdict"], *(f"{finding.severity}: {finding.line()}" for finding in findings)):
         show(line)
-    return reports
+    return report

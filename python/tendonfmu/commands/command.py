@@ -7,11 +7,11 @@ Every command takes `--json` and `--quiet`; a command with options shared by sev
 from __future__ import annotations
 
 import inspect
-import math
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import wraps
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -20,7 +20,7 @@ from typer.core import TyperCommand
 
 from tendonfmu.commands.console import DASH, PRINTED
 from tendonfmu.errors import InputError
-from tendonfmu.options import Number, Option, Options, Several
+from tendonfmu.options import Option, Options
 
 REPEATED = ("--test", "--pushes")  # `--test A B` means `--test A --test B`
 # how a file begins -> its suffix; what is none of these is a table in text
@@ -99,7 +99,7 @@ class Line(NamedTuple):
 
 
 LINES: dict[str, Line] = {}  # by the name of the command
-OF_HANDS: dict[str, Callable[..., None]] = {}  # takes the same where the first argument is a hand
+OF_HANDS = ("check", "run", "calibrate", "diagnose", "score")  # commands that take a hand in place of a finger
 
 
 def command(
@@ -118,11 +118,6 @@ def command(
         return function
 
     return decorate
-
-
-def of_hand(name: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Decorate what a command does with a hand in place of a finger."""
-    return lambda function: OF_HANDS.setdefault(name, function)
 
 
 def is_hand(path: Path) -> bool:
@@ -144,8 +139,10 @@ def for_typer(name: str) -> Callable[..., None]:
             # typer has None where nothing was given
             arguments["options"] = line.options(**{key: value for key, value in taken.items() if value is not None})
         with _standard_input(arguments, line.reads) as read:
-            hand = name in OF_HANDS and is_hand(next(iter(read.values())))
-            (OF_HANDS[name] if hand else line.function)(**read)
+            function = line.function
+            if name in OF_HANDS and is_hand(next(iter(read.values()))):
+                function = getattr(import_module("tendonfmu.commands.hand.commands"), f"{name}_hand")
+            function(**read)
 
     run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
@@ -171,15 +168,11 @@ def _parameters(function: Callable[..., None], options: type[Options] | None) ->
 def _option(name: str, option: Option, default: Any) -> inspect.Parameter:
     """Make the parameter of an option."""
     values = option.values
-    item = values.item if isinstance(values, Several) else values
-    limits: dict[str, float] = {}
-    if isinstance(item, Number):
-        limits = {"min": item.least} | ({"max": item.most} if math.isfinite(item.most) else {})
-    shown = typer.Option(*option.names, metavar=option.metavar, help=option.help, **limits)  # type: ignore[arg-type]
+    shown = typer.Option(*option.names, metavar=option.metavar, help=option.help, **values.limits)  # type: ignore[arg-type]
     return inspect.Parameter(
         name,
         inspect.Parameter.KEYWORD_ONLY,
-        default=None if isinstance(values, Several) else default,
+        default=None if isinstance(default, tuple) else default,
         annotation=Annotated[values.type, shown],
     )
 

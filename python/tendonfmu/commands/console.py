@@ -16,6 +16,8 @@ import errno
 import os
 import sys
 import threading
+import warnings
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -29,7 +31,6 @@ from tendonfmu.errors import InputError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from tendonfmu.commands.result import Result
     from tendonfmu.estimate import FitProgress
     from tendonfmu.tasks import PhaseState
 
@@ -139,6 +140,35 @@ def deliver(result: Any, output: Path, words: str, report: Path | None = None) -
     print_json(lambda: text)
     print_result(result)
     say(f"{output}: {words}")
+
+
+class Result(ABC):
+    """Base of a result that is a report: it shows itself in a notebook as in the terminal."""
+
+    @property
+    @abstractmethod
+    def report(self) -> Mapping[str, Any]:
+        """All results, as the command writes them."""
+
+    @property
+    def warnings(self) -> list[str]:
+        """Remarks on the recordings and the result, one sentence each."""
+        return list(self.report["warnings"])
+
+    @abstractmethod
+    def shown(self) -> tuple[Iterable[Any], Iterable[str], str]:
+        """Return tables, lines, and the heading of a column that is aligned to the left, as the command prints them."""
+
+    def warn(self, category: type[Warning]) -> None:
+        """Issue the remarks as warnings, at the call of the command's function."""
+        for sentence in self.warnings:
+            warnings.warn(sentence, category, stacklevel=4)
+
+    def _repr_html_(self) -> str:
+        tables, lines, _ = self.shown()
+        from tendonfmu.report import html_of  # its packages take time of every command
+
+        return html_of(repr(self)[1:-1], tables, lines, self.warnings)
 
 
 def print_result(result: Result) -> None:

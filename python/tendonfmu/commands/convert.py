@@ -213,11 +213,7 @@ def _convert_episodes(folder: Path, output: Path, map_file: Path, episodes: str 
     said: dict[str, list[str]] = {}  # the episodes of each note
     target = output.absolute()
     target.parent.mkdir(parents=True, exist_ok=True)
-    files.remove_left_behind(target)
-    with (
-        tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}-") as scratch,
-        files.in_use(Path(scratch)),
-    ):
+    with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}-") as scratch:
         for episode in log.episodes:
             alone, name = log.only(episode), f"episode_{episode.number:06d}.parquet"
             conversion = recorded.Conversion(folder, map_file, alone)

@@ -181,11 +181,11 @@ class Story:
         )
         sheets = [list(reporting.torque_sheets(picture))[-1]]
         sheets += [sheet for sheet in reporting.law_sheets(picture) if sheet.name == "laws_joints"]
-        lines = list(reporting.fit_text.summary_sentences(picture, residuals))
+        lines = list(reporting.fit_page.summary_sentences(picture, residuals))
         return Chapter(
             "fit",
             tile,
-            [next(reporting.fit_text.tables(fitted.estimator))],
+            [next(reporting.fit_page.tables(fitted.estimator))],
             lines,
             sheets,
             f"fit/{reporting.fit_page.PAGE}",
@@ -205,10 +205,10 @@ class Story:
         self.files |= reporting.write_score_figures(after.scored, self.folder / "score")
         tile = reporting.Tile(f"{after.found} of {after.events}", "", "pushes found, without a touch sensor")
         as_given = f"as given: {before.found} of {before.events} pushes found"
-        lines = [*reporting.detect_text.score_lines(after.scored), as_given]
+        lines = [*reporting.detection.score_lines(after.report), as_given]
         sheet = next(reporting.score_sheets(after.scored))
         return Chapter(
-            "detect", tile, list(reporting.detect_text.score_tables(after.scored)), lines, [sheet], "score/score.html"
+            "detect", tile, list(reporting.detection.score_tables(after.report)), lines, [sheet], "score/score.html"
         )
 
     def _run(self, data: Path, phase: Phase) -> Chapter:
@@ -225,7 +225,7 @@ class Story:
             page = reporting.write_run_page(self.folder / f"{name}.html", report, table)
             self.files |= {outputs: f"the FMU's outputs over {name}.parquet", page: "the same, for a browser"}
             force = f"{result.recording.groups['tendon_force'].mean():.0f} N"
-            (joint,) = (sheet for sheet in reporting.run_sheets(table, finger.joint_names, []) if sheet.title == SHOWN)
+            (joint,) = (sheet for sheet in reporting.run_sheets(table, finger.joint_names) if sheet.title == SHOWN)
             sheets.append(replace(joint, caption=f"{SHOWN.replace('_', ' ')}, free motion at {force}"))
             lines.append(f"free motion at {force}: {result.summary}")
             headings.append(f"at {force}")

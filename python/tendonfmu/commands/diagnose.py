@@ -15,8 +15,16 @@ from tendonfmu import diagnosis, drawing, estimate, files, model, tasks
 from tendonfmu import recordings as recorded
 from tendonfmu import report as reporting
 from tendonfmu.commands.command import ExtendedFinger, FreeRecordings, Progress, Scheduler, command, output_option
-from tendonfmu.commands.console import Bar, print_json, print_result, print_results, progress_bar, say_files, warn
-from tendonfmu.commands.result import Result
+from tendonfmu.commands.console import (
+    Bar,
+    Result,
+    print_json,
+    print_result,
+    print_results,
+    progress_bar,
+    say_files,
+    warn,
+)
 from tendonfmu.errors import InputError
 from tendonfmu.options import DiagnoseOptions, RecordingSources, keywords
 
@@ -241,7 +249,7 @@ def _history(
             seed=options.seed,
             progress=show,
         )
-    names = diagnosis.Names(tuple(given.joint_names), tuple(given.tendon_names))
+    names = diagnosis.names_in(given.data)
     written = reporting.write_history(history, names, output)
     headings = ("cause", "place", "reference", "last", "named in", "trend")
     rows = list(reporting.rows_of_lines(history, names))

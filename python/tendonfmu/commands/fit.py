@@ -14,8 +14,7 @@ import typer
 from tendonfmu import drawing, estimate, files, fmu
 from tendonfmu import report as reporting
 from tendonfmu.commands.command import FingerFile, FreeRecordings, Progress, Report, command, output_option
-from tendonfmu.commands.console import INTERRUPTED, Bar, deliver, fail, say, say_files
-from tendonfmu.commands.result import Result
+from tendonfmu.commands.console import INTERRUPTED, Bar, Result, deliver, fail, say, say_files
 from tendonfmu.options import FitArguments, RecordingSources, keywords
 
 if TYPE_CHECKING:
@@ -92,7 +91,7 @@ class FitResult(Result):
 
     def shown(self) -> Any:
         """Return what the command prints."""
-        return reporting.fit_text.tables(self.estimator), reporting.fit_text.lines(self.estimator), "joint"
+        return reporting.fit_page.tables(self.estimator), reporting.fit_page.lines(self.estimator), "joint"
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write the fitted description, or the estimated numbers as a parameter set of SSP.

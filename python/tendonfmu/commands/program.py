@@ -21,8 +21,7 @@ from typer.core import TyperGroup
 
 from tendonfmu.commands.command import SeveralValues, for_typer
 from tendonfmu.commands.console import BAD_INPUT, FAULT, INTERRUPTED, PRINTED, fail, leave, reader_may_leave, warn
-from tendonfmu.errors import InputWarning, refusal
-from tendonfmu.fault_report import write_fault_report
+from tendonfmu.errors import InputWarning, refusal, write_fault_report
 from tendonfmu.tasks import ended_by_signals
 
 _show_as_python = warnings.showwarning
@@ -81,7 +80,6 @@ COMMANDS = {
     "demo": ("Show every step on built-in data.", ""),
 }
 MODULES = {"import": "mjcf", "export": "mjcf"}  # of commands that have none of their own name
-OF_HANDS = ("check", "run", "calibrate", "diagnose", "score")  # commands that take a hand in place of a finger
 
 
 class Lazily(Mapping[str, Any]):
@@ -103,8 +101,6 @@ class Lazily(Mapping[str, Any]):
 def _made(name: str) -> Any:
     """Import a command and make its command line."""
     import_module(f"tendonfmu.commands.{MODULES.get(name, name)}")
-    if name in OF_HANDS:
-        import_module("tendonfmu.commands.hand.commands")
     alone = typer.Typer(add_completion=False, **SETTINGS)
     summary, example = COMMANDS[name]
     shown = "\n  ".join(["\b\nExample:", f"tendonfmu {name} {example}".rstrip()])

@@ -13,8 +13,7 @@ import typer
 from tendonfmu import detect, drawing, estimate, files, recordings
 from tendonfmu import report as reporting
 from tendonfmu.commands.command import Figures, Model, Progress, command, output_option
-from tendonfmu.commands.console import deliver, progress_bar, say_files
-from tendonfmu.commands.result import Result
+from tendonfmu.commands.console import Result, deliver, progress_bar, say_files
 from tendonfmu.options import RecordingSources, ScoreOptions, keywords
 
 if TYPE_CHECKING:
@@ -74,7 +73,7 @@ class ScoreResult(Result):
 
     def shown(self) -> Any:
         """Return what the command prints."""
-        return reporting.detect_text.score_tables(self.scored), reporting.detect_text.score_lines(self.scored), ""
+        return reporting.detection.score_tables(self.report), reporting.detection.score_lines(self.report), ""
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write the report, as `tendonfmu score -o`. Raises InputError if it cannot be written."""

@@ -13,8 +13,7 @@ import typer
 from tendonfmu import detect, drawing, estimate
 from tendonfmu import report as reporting
 from tendonfmu.commands.command import Figures, FreeAtPretensions, Progress, Report, command, output_option
-from tendonfmu.commands.console import NO, deliver, fail, progress_bar, say_files
-from tendonfmu.commands.result import Result
+from tendonfmu.commands.console import NO, Result, deliver, fail, progress_bar, say_files
 from tendonfmu.options import RecordingSources, TuneOptions, keywords
 
 if TYPE_CHECKING:
@@ -54,7 +53,7 @@ class TuneResult(Result):
 
     def shown(self) -> Any:
         """Return what the command prints."""
-        return reporting.detect_text.tune_tables(self.tuning), reporting.detect_text.tune_lines(self.tuning), "joint"
+        return reporting.detection.tune_tables(self.report), reporting.detection.tune_lines(self.report), "joint"
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write the tuned description, as `tendonfmu tune -o`. Raises InputError if it cannot be written."""

@@ -1,7 +1,6 @@
 """The figures of pages and notebooks, and the picture of a finger. Draws ready-made data; computes nothing.
 
-- `figures`: traces of Plotly, panels of them, sheets of panels
-- `output`: panels as JSON for a page, and as one Plotly figure for a notebook
+- `figures`: traces of Plotly, panels of them, sheets of panels; as JSON for a page, or as a figure for a notebook
 - `finger_picture`: draws what an FMU carries, with Pillow
 """
 
@@ -17,6 +16,7 @@ if TYPE_CHECKING:
         DIVERGING,
         GREEN,
         GREY,
+        IN_DARK,
         LIGHT,
         ORANGE,
         PURPLE,
@@ -32,15 +32,19 @@ if TYPE_CHECKING:
         band,
         bars,
         curve,
+        dark_colours,
         dots,
+        figures_json,
         heat,
         histogram,
         lane,
         mark,
+        packed_plotly,
         panel,
+        series_figure,
+        sheets_figure,
         stripes,
     )
     from .finger_picture import draw_finger, draw_terminal
-    from .output import IN_DARK, dark_colours, figures_json, packed_plotly, series_figure, sheets_figure
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -1,8 +1,8 @@
 """How files are read and written: whole or not at all.
 
-`writing` writes whole files, `tables` reads and writes tables of numbers (CSV, Parquet, pandas, MCAP), `json_node`
-reads JSON and keeps the path of each value for error messages, `stand_in` names what temporary files stand for, and
-`texts` writes a number with its noun and reads templates of HTML.
+`writing` writes whole files and names what temporary ones stand for, `tables` reads and writes tables of numbers (CSV,
+Parquet, pandas, MCAP), `json_node` reads JSON and keeps the path of each value for error messages, and `texts` writes a
+number with its noun and reads templates of HTML.
 """
 
 from typing import TYPE_CHECKING
@@ -11,7 +11,6 @@ from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from .json_node import Node, Refusal, finite, format_of, read_json, report_text
-    from .stand_in import StandIn, path_of
     from .tables import (
         FORMATS,
         OUTPUTS,
@@ -28,6 +27,14 @@ if TYPE_CHECKING:
         write_table,
     )
     from .texts import are, by_kind, counted, html_template, listed, percent
-    from .writing import check_output, check_output_folder, in_use, is_about, remove_left_behind, whole_file, write_text
+    from .writing import (
+        StandIn,
+        check_output,
+        check_output_folder,
+        is_about,
+        path_of,
+        whole_file,
+        write_text,
+    )
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

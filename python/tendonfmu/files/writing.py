@@ -1,25 +1,47 @@
-"""How files are written so that they appear whole or not at all."""
+"""How files are written so that they appear whole or not at all, and how temporary files are named in messages."""
 
 from __future__ import annotations
 
-import glob
 import os
-import re
-import shutil
 import tempfile
-import time
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
-from pathlib import Path
+from contextlib import contextmanager
+from pathlib import Path, PosixPath, WindowsPath
+from typing import TYPE_CHECKING
 
 from tendonfmu.errors import InputError, OutputError
 
-try:
-    import fcntl
-except ImportError:  # on Windows, where an open file could not be replaced anyway
-    fcntl = None  # type: ignore[assignment]
+if TYPE_CHECKING:
+    SystemPath = Path
+else:
+    SystemPath = PosixPath if os.name == "posix" else WindowsPath
 
-_YOUNG = 60.0  # s; a younger file may not have its lock yet
+
+class StandIn(SystemPath):
+    """A file whose text is the name of what it stands for, so that messages name that."""
+
+    shown: str
+
+    @classmethod
+    def of(cls, file: Path, shown: str) -> StandIn:
+        """Return a file that is shown by another name."""
+        path = cls(file)
+        path.shown = shown
+        return path
+
+    def __str__(self) -> str:
+        return getattr(self, "shown", None) or super().__str__()  # a path made from this one is an ordinary one
+
+    def __fspath__(self) -> str:
+        return super().__str__()
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return StandIn.of, (Path(os.fspath(self)), str(self))
+
+
+def path_of(file: str | os.PathLike[str]) -> Path:
+    """Return a path; one that stands for something still does."""
+    return file if isinstance(file, Path) else Path(file)
 
 
 def check_output(output: Path, *inputs: Path) -> None:
@@ -72,7 +94,6 @@ def _check_writable(output: Path, folder: Path) -> None:
 def whole_file(file: Path) -> Iterator[Path]:
     """Write a file whole or not at all."""
     _check_place(file)
-    remove_left_behind(file)
     try:
         handle, name = tempfile.mkstemp(dir=file.parent, prefix=f".{file.name}-", suffix=file.suffix)
     except OSError as error:
@@ -80,8 +101,7 @@ def whole_file(file: Path) -> Iterator[Path]:
     os.close(handle)
     temporary = Path(name)
     try:
-        with in_use(temporary):
-            yield temporary
+        yield temporary
         # mkstemp's files are private; a result gets the permissions of any other new file
         mask = os.umask(0)
         os.umask(mask)
@@ -93,47 +113,6 @@ def whole_file(file: Path) -> Iterator[Path]:
         raise OutputError(f"{file}: cannot be written ({error.strerror or error})") from None
     finally:
         temporary.unlink(missing_ok=True)
-
-
-@contextmanager
-def in_use(temporary: Path) -> Iterator[None]:
-    """Hold a lock on a temporary file or folder, which ends with the process; `remove_left_behind` then spares it."""
-    handle = _locked(temporary)
-    try:
-        yield
-    finally:
-        if handle is not None:
-            os.close(handle)
-
-
-def remove_left_behind(target: Path) -> None:
-    """Remove temporary files and folders of an earlier try to write a target, as `kill -9` leaves them."""
-    pattern = re.compile(rf"\.{re.escape(target.name)}-[a-z0-9_]{{8}}({re.escape(target.suffix)})?")  # of mkstemp
-    for path in target.absolute().parent.glob(f".{glob.escape(target.name)}-*"):
-        with suppress(OSError):
-            if not pattern.fullmatch(path.name) or time.time() - path.stat().st_mtime < _YOUNG:
-                continue
-            handle = _locked(path)
-            if handle is None:
-                continue
-            os.close(handle)
-            if path.is_dir():
-                shutil.rmtree(path)
-            else:
-                path.unlink()
-
-
-def _locked(path: Path) -> int | None:
-    """Return a descriptor that holds a lock; None if another one holds it, or without locks."""
-    if fcntl is None:
-        return None
-    handle = os.open(path, os.O_RDONLY)
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        os.close(handle)
-        return None
-    return handle
 
 
 def is_about(error: OSError, folder: Path) -> bool:

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from tendonfmu.arrays import Numbers
-from tendonfmu.drawing import BLUE, DARK, GREY, SAND, VERMILION, Sheet, curve, lane, mark, panel, stripes
+from tendonfmu.drawing import BLUE, DARK, SAND, VERMILION, Sheet, curve, mark, panel, stripes
 from tendonfmu.report.numbers import rms, rounded, torque_unit
-
-VISIBLE = 0.003  # of the longest recording: shorter alarms are drawn so long
 
 
 @dataclass(frozen=True)
@@ -90,32 +87,3 @@ def push_sheet(shown: PushShown) -> Sheet:
     )
     caption = "The push with the median delay of those that are found. The line is where contact is reported."
     return Sheet("push", "push", f"{shown.recording}, at {shown.onset:.1f} s", [drawn], caption)
-
-
-def pushes_sheet(pushes: Sequence[Mapping[str, Any]], alarms: Sequence[Mapping[str, Any]]) -> Sheet:
-    """Draw when pushes were found and missed, and false alarms, a row per recording."""
-    names = list(dict.fromkeys(each["recording"] for each in pushes))
-    kinds = (
-        ("push, found", BLUE, [each for each in pushes if each["found"]], "onset_s"),
-        ("push, missed", GREY, [each for each in pushes if not each["found"]], "onset_s"),
-        ("alarm without a push", VERMILION, list(alarms), "begin_s"),
-    )
-    least = VISIBLE * max(each["end_s"] for each in pushes)
-    lanes = []
-    for meaning, colour, stretches, begin in kinds:
-        for row, name in enumerate(names):
-            here = [each for each in stretches if each["recording"] == name]
-            spans = [(each[begin], max(each["end_s"], each[begin] + least)) for each in here]
-            lanes += [lane(spans, row, meaning, colour)] if spans else []
-    drawn = panel(
-        "Pushes and false alarms",
-        "When pushes were found and missed, and when there was an alarm without a push",
-        "time (s)",
-        "",
-        *lanes,
-        size="wide",
-        height=100 + 36 * len(names),
-        rows=names,
-        zoom="pushes",
-    )
-    return Sheet("pushes", "pushes", "All pushes", [drawn])

@@ -12,10 +12,9 @@ import numpy as np
 from tendonfmu import drawing as draw
 from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis import Cause, Diagnosis, Evidence, Names, ResidualView, at_place
-from tendonfmu.files import counted
 from tendonfmu.report.diagnosis_text import names_of, unit_of
 from tendonfmu.report.diagnosis_words import Words, words_of
-from tendonfmu.report.numbers import capital, unit_text, with_ends
+from tendonfmu.report.numbers import capital
 
 TWO_SIDED = 1.96  # standard errors of a 95 % interval
 _TITLES = {
@@ -76,29 +75,7 @@ def _cause_sheet(diagnosis: Diagnosis, names: Names, number: int, cause: Cause) 
     limits = _same_scale(cause.evidence, factor)
     panels = [_evidence_panel(each, names, (factor, unit), limits, bool(cause.changed)) for each in cause.evidence]
     title = f"{number}. {at_place(capital(cause.title), cause.where, names)}"
-    return draw.Sheet(f"cause_{number}", f"cause_{number}", title, [*panels, *_by_recording(diagnosis, cause)])
-
-
-def _by_recording(diagnosis: Diagnosis, cause: Cause) -> Iterator[draw.Panel]:
-    """Show how large a change is in each of several new recordings."""
-    changed = cause.changed
-    if changed is None or not changed.by:
-        return
-    factor, unit = (1.0, unit_text(changed.unit)) if unit_text(changed.unit) else (100.0, "%")
-    x = np.arange(1.0, len(changed.by) + 1.0)
-    value, low, high = with_ends(changed.by, factor)
-    then = np.full(2, factor * changed.reference.value)
-    yield draw.panel(
-        "In each of the new recordings",
-        f"Size of this change in each of {counted(len(changed.by), 'new recording')}, in their order",
-        "new recording, in the order given",
-        f"{changed.number.replace('_', ' ')} ({unit})",
-        draw.bars(x, low, high, "", draw.BLUE, 1.0),
-        draw.curve(x, value, "", draw.BLUE, 0.9, alpha=0.45),
-        draw.curve([1.0, x[-1]], then, "", draw.GREY, 1.1, "dash"),
-        draw.dots(x, value),
-        x_ticks=[(float(k), str(int(k))) for k in x] if len(x) <= 12 else (),
-    )
+    return draw.Sheet(f"cause_{number}", f"cause_{number}", title, panels)
 
 
 def _evidence_panel(

@@ -21,9 +21,7 @@ from tendonfmu.errors import OutputError, own_fault
 from tendonfmu.files import (
     check_output_folder,
     finite,
-    in_use,
     is_about,
-    remove_left_behind,
     report_text,
     write_text,
 )
@@ -75,11 +73,9 @@ def _make_for(diagnosis: found.Diagnosis, folder: Path, named: Path) -> dict[Pat
 @contextmanager
 def _folder_beside(folder: Path) -> Iterator[Path]:
     """Make a temporary folder on the same disk. Its removal is not interrupted."""
-    remove_left_behind(folder.absolute())
     name = tempfile.mkdtemp(dir=folder.absolute().parent, prefix=f".{folder.absolute().name}-")
     try:
-        with in_use(Path(name)):
-            yield Path(name)
+        yield Path(name)
     finally:
         with uninterrupted():
             shutil.rmtree(name, ignore_errors=True)

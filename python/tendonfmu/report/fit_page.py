@@ -1,22 +1,342 @@
-"""What the page of a fit, `report.html`, shows."""
+"""How a fit reads: tables and lines for the terminal, and its page, `report.html`."""
 
 from __future__ import annotations
 
+import math
+from collections import Counter
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from tendonfmu.estimate import FitPicture, FitReport, FittedNumber, verdicts
-from tendonfmu.files import write_text
-from tendonfmu.model import part_of
+from tendonfmu.estimate import (
+    Comparison,
+    FitPicture,
+    FitReport,
+    Fitted,
+    FittedNumber,
+    FrictionFit,
+    ResidualRms,
+    identifiability,
+    known_numbers,
+    verdicts,
+)
+from tendonfmu.files import are, counted, write_text
+from tendonfmu.model import Finger, effects, part_of
 from tendonfmu.recordings import RecordingEntry
-from tendonfmu.report import fit_text as text
 from tendonfmu.report.fit_figures import fit_sheets, strongest_pairs
-from tendonfmu.report.numbers import Row, percent, unit_text
+from tendonfmu.report.numbers import Row, Table, column, percent, rounded, together, torque_unit, unit_text
 from tendonfmu.report.page import Tile, make_folder, render
 
 PAGE = "report.html"
 PAIRS = 20  # most strongly correlated pairs in the table
+EXAMPLES = 3  # paths listed for each reason
+_METHODS = {
+    "batch": "Maximum likelihood over all samples at once (batch)",
+    "ekf": "The extended Kalman filter of the paper (ekf), sample by sample",
+}
+_LIMIT = f"{100 * identifiability.LIMIT:.0f}\u00a0%"
+_COMPARED = "Not trained on: "
+
+
+# --- residuals --------------------------------------------------------------------------------------------------------
+
+
+RESIDUAL_HEADINGS = ("torque", "fitted", "left", "before the fit", "bias alone", "friction alone")
+
+
+@dataclass(frozen=True)
+class ResidualRow:
+    """Residuals of one joint, or of all together: rms in `ResidualTable.unit`, None where unknown."""
+
+    name: str  # of the joint, or of the set of data
+    torque: float | None
+    fitted: float | None
+    start: float | None
+    bias_only: float | None
+    model_only: float | None
+
+    @property
+    def left(self) -> float | None:
+        """Return the residual over the torque."""
+        return self.share(self.fitted)
+
+    def share(self, value: float | None) -> float | None:
+        return value / self.torque if value is not None and self.torque else None
+
+    @property
+    def texts(self) -> Row:
+        """Return the cells below `RESIDUAL_HEADINGS`."""
+        left = "–" if self.left is None else f"{rounded(100 * self.left, 2)} %"
+        others = map(rounded, (self.start, self.bias_only, self.model_only))
+        return rounded(self.torque), rounded(self.fitted), left, *others
+
+
+@dataclass(frozen=True)
+class ResidualTable:
+    """Residuals of one set of data, a row per joint; or of all sets if the finger has one joint."""
+
+    title: str
+    unit: str  # of the torques
+    rows: list[ResidualRow]
+    all: ResidualRow  # all joints together
+
+
+def residual_tables(report: FitReport, joints: Sequence[str]) -> list[ResidualTable]:
+    """List the residuals of a fit by set of data, all in one unit."""
+    residual = report["residual"]
+    sets: list[tuple[str, ResidualRms | Comparison | None]]
+    sets = [("Training", residual["train"]), ("Held out of training", residual["held_out"])]
+    sets += [(f"{_COMPARED}{run['label']}", run) for run in residual["comparisons"]]
+    known = [(title, data) for title, data in sets if data and "rms" in data]
+    factor, unit = torque_unit(max((max(column(data["torque_rms"])) for _, data in known), default=0.0))
+    listed = []
+    for title, data in known:
+        figures = (data["torque_rms"], data["rms"], data["start_rms"], data["bias_only_rms"], data["model_only_rms"])
+        columns = [column(each) for each in figures]
+        rows = [
+            ResidualRow(name, *(factor * value if math.isfinite(value) else None for value in values))
+            for name, *values in zip(
+                [*joints, "all joints"], *([*each, together(each)] for each in columns), strict=True
+            )
+        ]
+        listed.append(ResidualTable(title, unit, rows if len(joints) > 1 else rows[:1], rows[-1]))
+    return listed
+
+
+def page_tables(tables: list[ResidualTable], joints: Sequence[str]) -> list[ResidualTable]:
+    """List the residuals as the page shows them: those of a finger with one joint are joined, a row per set of data."""
+    if len(joints) > 1 or not tables:
+        return tables
+    rows = [replace(table.all, name=table.title) for table in tables]
+    return [ResidualTable(joints[0], tables[0].unit, rows, rows[0])]
+
+
+# --- sentences of the page --------------------------------------------------------------------------------------------
+
+
+def state_of(report: FitReport) -> str:
+    """Say what is wrong with the fit; empty if nothing is."""
+    if not report["finished"]:
+        return "Unfinished: the fit was interrupted. These are the best values so far."
+    return "" if report["converged"] else "Not converged: the values may still change with more iterations."
+
+
+def summary_sentences(picture: FitPicture, tables: Sequence[ResidualTable]) -> Iterator[str]:
+    """Say what was estimated, how, how well the model fits, and how well its numbers are known."""
+    report = picture.report
+    yield from _what(picture)
+    method = _METHODS.get(report["method"], str(report["method"]))
+    rounds = "" if report["method"] == "ekf" else f", {counted(report['passes'], 'pass', 'passes')} over the data"
+    yield f"{method}{rounds}, {report['seconds']:.3g} s."
+    yield from _how_well(tables)
+    yield from report["routing"]["sentences"] if report["routing"] else ()
+    yield from memory_sentences(report)
+    yield report["given_numbers"]["paragraph"]
+    count, of = report["identified"]["count"], report["identified"]["of"]
+    kept = sum(entry["reason"] == "kept" for entry in report["parameters"])
+    yield (
+        f"{count} of {of} numbers are identified by these recordings: their standard errors are at most {_LIMIT} of "
+        "their values, and at most half of what was known before."
+    )
+    if kept:
+        yield f"{counted(kept, 'number')} {are(kept)} better known from the earlier fit than from these recordings."
+    if count + kept < of:
+        yield f"What would identify the other {of - count - kept} is listed below."
+    yield from sums_known(picture.fitted)
+
+
+def memory_sentences(report: FitReport) -> Iterator[str]:
+    """Say which angles friction that remembers was fitted to, and what is left with them and as delivered."""
+    memory = report["memory"]
+    if memory:
+        left, delivered = (
+            ", ".join(f"{1e3 * value:.3g}" for value in column(values))
+            for values in (memory["left"], memory["left_delivered"])
+        )
+        beside = "" if left == delivered else f"; {delivered} mN·m with the kinematics asked for"
+        yield f"Fitted to the angles of {memory['angles']}: {left} mN·m by joint left without a learning bias{beside}."
+
+
+def sums_known(finger: Finger) -> Iterator[str]:
+    """Name the tendons whose friction is known in sum, but not at each of its places."""
+    known = known_numbers(finger.data)
+    for i, name in enumerate(finger.tendon_names, start=1):
+        places = [effect.path for effect in effects(finger.data) if effect.tendon == i]
+        if f"tendons[{i}]" in known and not all(path in known for path in places):
+            value, error = known[f"tendons[{i}]"]
+            yield (
+                f"Coulomb friction of tendon {name}, all {counted(len(places), 'place')} together: "
+                f"{rounded(100.0 * value, 2)} ± {rounded(100.0 * error, 1)} % of its force."
+            )
+
+
+def _what(picture: FitPicture) -> Iterator[str]:
+    report, recordings = picture.report, picture.report["recordings"]
+    seconds = sum(recording["duration"] or 0.0 for recording in recordings)
+    used, held = (sum(recording[key] for recording in recordings) for key in ("used", "held_out"))
+    one = len(recordings) == 1
+    source = f"one recording of {seconds:.4g} s" if one else f"{len(recordings)} recordings of {seconds:.4g} s together"
+    finger = (
+        f"{counted(len(picture.fitted.joint_names), 'joint')}, {counted(len(picture.fitted.tendon_names), 'tendon')}"
+    )
+    sentence = (
+        f"{report['identified']['of']} numbers of the friction of {report['finger']} ({finger}) were estimated "
+        f"together from {source}: {_thousands(used)} samples"
+    )
+    yield sentence + (f"; {_thousands(held)} more were held out to judge the result." if held else ".")
+    out = sum(recording.get("contact_left_out") or 0 for recording in recordings)
+    if out:
+        samples = "sample with contact was" if out == 1 else "samples with contact were"
+        yield f"{_thousands(out)} {samples} left out."
+
+
+def _thousands(number: int) -> str:
+    return f"{number:,}".replace(",", "\u202f")
+
+
+def _how_well(tables: Sequence[ResidualTable]) -> Iterator[str]:
+    few, many = apart(tables)
+    for table in few:
+        row = table.all
+        if row.left is None:
+            continue
+        amounts = f"{rounded(row.fitted)} of {rounded(row.torque)} {table.unit}"
+        text = f"{table.title}: {amounts} of torque are left, {percent(row.left)}"
+        start, bias, model = (row.share(value) for value in (row.start, row.bias_only, row.model_only))
+        if start is not None:
+            text += f"; with the starting values {percent(start)}"
+        if table is tables[0] and bias is not None and model is not None:
+            text += (
+                f". The bias alone, without friction, leaves {percent(bias)}; the friction alone, with a constant "
+                f"bias, {percent(model)}"
+            )
+        yield text + "."
+    if many:
+        yield f"{counted(len(many), 'recording')} not trained on: {range_of(many)} of the torque are left."
+
+
+def apart(tables: Sequence[ResidualTable]) -> tuple[list[ResidualTable], list[ResidualTable]]:
+    """Split tables into those described one by one and comparisons that are too many for that."""
+    compared = [table for table in tables if table.title.startswith(_COMPARED)]
+    if len(compared) <= 2:
+        return list(tables), []
+    return [table for table in tables if table not in compared], compared
+
+
+def range_of(tables: Sequence[ResidualTable]) -> str:
+    """Return the least and the largest share of the torque that is left."""
+    shares = [table.all.left for table in tables if table.all.left is not None]
+    return f"{percent(min(shares))} to {percent(max(shares))}" if shares else "an unknown share"
+
+
+def consistency(picture: FitPicture) -> Iterator[str]:
+    """Describe the size (NIS) and whiteness of the innovations in words."""
+    innovations = picture.report["innovations"]
+    nis, lag_one = innovations["nis"], innovations["whiteness"]["lag_one"]
+    mean = nis["mean"]
+    if mean is not None:
+        low, high = nis["interval"]
+        meaning = "as large as the noise that the description states"
+        if not nis["consistent"]:
+            size, far = ("larger", "small") if mean > 1 else ("smaller", "large")
+            meaning = (
+                f"{size} than the noise that the description states, by a factor of {math.sqrt(mean):.2g}; this "
+                f"alone makes the standard errors too {far} by about the same factor"
+            )
+        yield (
+            f"Mean squared standardised innovation (NIS) {mean:.3g}; expected 1, in 95 % of cases between "
+            f"{low:.4g} and {high:.4g}. The innovations are {meaning}."
+        )
+    strong = [
+        f"{name} {value:.2f}"
+        for name, value in zip(picture.fitted.joint_names, lag_one, strict=True)
+        if value is not None and abs(value) > 0.1
+    ]
+    if strong:
+        samples, worth = sum(innovations["effective"]["samples"]), sum(innovations["effective"]["worth"])
+        count = "the standard errors count each sample as new"
+        if worth < samples:
+            count = f"estimates and standard errors count the {samples:.0f} samples as {worth:.0f}"
+        yield (
+            f"Autocorrelation from sample to sample: {', '.join(strong)}. White innovations have none. The residual "
+            f"has a shape in time that the model lacks; {count}."
+        )
+
+
+# --- printed ----------------------------------------------------------------------------------------------------------
+
+
+def tables(fit: FrictionFit) -> Iterator[Table]:
+    """List the tables to print: what is left of the torque, and the numbers by kind."""
+    report, known = fit.report_, fit.report_["identified"]
+    sets = residual_tables(report, fit.description_.joint_names)
+    unit = sets[0].unit if sets else "mN·m"
+    yield (
+        f"{report['finger']}: residual before the bias learns from the sample, rms in {unit}",
+        ("", "joint", *RESIDUAL_HEADINGS),
+        [("" if k else each.title, row.name, *row.texts) for each in sets for k, row in enumerate(each.rows)],
+    )
+    yield (
+        f"numbers that these recordings identify: {known['count']} of {known['of']}",
+        ("kind", "numbers", "identified", "median change", "at a bound"),
+        list(_kinds(fit.numbers_)),
+    )
+
+
+def _kinds(numbers: Sequence[Fitted]) -> Iterator[Row]:
+    by_kind: dict[str, list[Fitted]] = {}
+    for number in numbers:
+        path = number.number.path
+        kind = path.split("[")[0] if path.startswith("bias") else f"{number.number.kind}.{number.number.key}"
+        by_kind.setdefault(kind, []).append(number)
+    for kind, members in sorted(by_kind.items()):
+        known = [number for number in members if number.identified]
+        changes = sorted(abs(number.value / number.start - 1) for number in known if number.start)
+        change = f"{100 * changes[len(changes) // 2]:.0f} %" if changes else "-"
+        bound = sum(number.at_bound is not None for number in members)
+        yield kind, str(len(members)), str(len(known)), change, str(bound) if bound else "-"
+
+
+def lines(fit: FrictionFit) -> Iterator[str]:
+    """List the lines to print: how the fit went, the residuals, and what would identify the remaining numbers."""
+    report, numbers = fit.report_, fit.numbers_
+    recordings = report["recordings"]
+    used, held = sum(each["used"] for each in recordings), sum(each["held_out"] for each in recordings)
+    rests = sum(each["at_rest"] for each in recordings)
+    left_out = sum(each["contact_left_out"] + each["faulty_left_out"] for each in recordings)
+    ended = "converged" if report["converged"] else "NOT converged"
+    passes = f", {counted(report['passes'], 'pass', 'passes')}" if report["passes"] else ""
+    yield (
+        f"{report['method']}: {ended} in {report['seconds']:.1f} s{passes}; trained on {counted(used, 'sample')}, "
+        f"{held} held out, {left_out} left out" + (f", {rests} at rest" if rests else "")
+    )
+    innovations = report["innovations"]
+    low, high = innovations["nis"]["interval"]
+    if innovations["nis"]["mean"] is not None:
+        lags = ", ".join("-" if value is None else f"{value:.2f}" for value in innovations["whiteness"]["lag_one"])
+        yield (
+            f"innovations: NIS {innovations['nis']['mean']:.3g} ({low:.3f} to {high:.3f} if the noise settings "
+            f"hold), autocorrelation at lag one {lags}"
+        )
+    samples, worth = innovations["effective"]["samples"], innovations["effective"]["worth"]
+    if sum(worth) < sum(samples):
+        by_joint = ", ".join(f"{count:.0f}" for count in worth)
+        yield f"effective number of samples by joint: {by_joint} of {samples[0]:.0f}"
+    yield from report["routing"]["sentences"] if report["routing"] else ()
+    yield from memory_sentences(report)
+    yield report["given_numbers"]["paragraph"]
+    for cause, count in Counter(number.cause for number in numbers if number.cause).most_common():
+        yield f"  {count} not identified: {verdicts.CAUSES[cause]}"
+        several = [number for number in numbers if number.cause == cause and number.advice]
+        for number in several[:EXAMPLES]:
+            yield f"    {number.number.path}: {number.advice}"
+        if len(several) > EXAMPLES:
+            yield f"    ... and {count - EXAMPLES} more; --report lists all"
+    yield from sums_known(fit.description_)
+
+
+# --- the page ---------------------------------------------------------------------------------------------------------
 
 
 def write_fit_page(picture: FitPicture, folder: Path) -> dict[Path, str]:
@@ -29,21 +349,21 @@ def write_fit_page(picture: FitPicture, folder: Path) -> dict[Path, str]:
 def fit_page(picture: FitPicture) -> str:
     """Return the HTML text of the page of a fit."""
     report, joints = picture.report, picture.fitted.joint_names
-    tables = text.residual_tables(report, joints)
+    tables = residual_tables(report, joints)
     return render(
         "fit.html.jinja",
         fit_sheets(picture),
         report=report,
-        state=text.state_of(report),
+        state=state_of(report),
         tiles_shown=_tiles(report, tables),
-        sentences=list(text.summary_sentences(picture, tables)),
+        sentences=list(summary_sentences(picture, tables)),
         joint_names=joints,
         residuals=[
             (f"{each.title}: rms in {each.unit}", [(row.name, *row.texts) for row in each.rows])
-            for each in text.page_tables(tables, joints)
+            for each in page_tables(tables, joints)
         ],
-        residual_headings=text.RESIDUAL_HEADINGS,
-        consistency=list(text.consistency(picture)),
+        residual_headings=RESIDUAL_HEADINGS,
+        consistency=list(consistency(picture)),
         doubts=list(_doubts(report)),
         pairs=[
             (f"{pair.correlation:+.3f}".replace("-", "−"), pair.first, pair.second)
@@ -55,22 +375,19 @@ def fit_page(picture: FitPicture) -> str:
     )
 
 
-def _tiles(report: FitReport, tables: Sequence[text.ResidualTable]) -> list[Tile]:
-    few, many = text.apart(tables)
+def _tiles(report: FitReport, tables: Sequence[ResidualTable]) -> list[Tile]:
+    few, many = apart(tables)
     tiles = [
         Tile(percent(table.all.left), "", f"of the torque is left: {table.title[0].lower() + table.title[1:]}")
         for table in few
         if table.all.left is not None
     ]
     if many:
-        tiles.append(Tile(text.range_of(many), "", f"of the torque is left in {len(many)} recordings not trained on"))
+        tiles.append(Tile(range_of(many), "", f"of the torque is left in {len(many)} recordings not trained on"))
     bias = tables[0].all.share(tables[0].all.bias_only) if tables else None
     if bias is not None:
         tiles.append(Tile(percent(bias), "", "would be left by the bias alone"))
     return [*tiles, Tile(f"{report['identified']['count']}/{report['identified']['of']}", "", "numbers identified")]
-
-
-# --- tables -----------------------------------------------------------------------------------------------------------
 
 
 def _doubts(report: FitReport) -> Iterator[tuple[str, list[Row]]]:

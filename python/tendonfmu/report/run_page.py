@@ -52,10 +52,9 @@ def write_run_page(report: Path, numbers: Mapping[str, Any], table: Table, label
 def run_page(numbers: Mapping[str, Any], table: Table, label: NDArray[Any] | None = None) -> str:
     """Return the HTML text of the page of a run."""
     joints = [joint["name"] for joint in numbers["joints"]]
-    tendons = [tendon["name"] for tendon in numbers["tendons"]]
     return render(
         "run.html.jinja",
-        run_sheets(table, joints, tendons, label),
+        run_sheets(table, joints, label),
         run=numbers,
         headline_numbers=list(_tiles(numbers)),
         joints=[_joint_row(joint) for joint in numbers["joints"]],
@@ -110,16 +109,13 @@ def _joint_row(joint: Mapping[str, Any]) -> Row:
 # --- figures ----------------------------------------------------------------------------------------------------------
 
 
-def run_sheets(
-    table: Table, joints: Sequence[str], tendons: Sequence[str], label: NDArray[Any] | None = None
-) -> Iterator[draw.Sheet]:
+def run_sheets(table: Table, joints: Sequence[str], label: NDArray[Any] | None = None) -> Iterator[draw.Sheet]:
     """Yield the figures of a run."""
     # table: [N]
     torques = (table[f"joint_torque[{j}]"] for j in range(1, len(joints) + 1))
     factor, unit = torque_unit(max(float(np.abs(torque).max()) for torque in torques), 1.0)
     for j, name in enumerate(joints, start=1):
-        yield draw.Sheet("joints", f"joint_{j}", name, list(_torque_panels(table, j, name, factor, unit)))
-    yield _events_sheet(table, joints, tendons, label)
+        yield draw.Sheet("joints", f"joint_{j}", name, list(_torque_panels(table, j, name, factor, unit, label)))
     motion = [
         draw.panel(
             f"{name}: {key}",
@@ -135,13 +131,18 @@ def run_sheets(
     yield draw.Sheet("motion", "motion", "Joint angles and speeds", motion, folded=True)
 
 
-def _torque_panels(table: Table, j: int, name: str, factor: float, unit: str) -> Iterator[draw.Panel]:
+def _torque_panels(
+    table: Table, j: int, name: str, factor: float, unit: str, label: NDArray[Any] | None
+) -> Iterator[draw.Panel]:
     time = table["time"]
     torque, friction, left, std = (
         factor * np.asarray(table[f"{key}[{j}]"], dtype=np.float64)
         for key in ("joint_torque", "friction_torque", "compensated_torque", "compensated_torque_std")
     )
-    contact = draw.stripes(flagged_stretches(time, table[f"joint_contact[{j}]"]), "contact", draw.VERMILION, 0.16)
+    contact = draw.stripes(
+        flagged_stretches(time, table[f"joint_contact[{j}]"]), "contact as detected", draw.VERMILION, 0.16
+    )
+    labelled = [] if label is None else flagged_stretches(time, label)
     yield draw.panel(
         "Torque and friction",
         f"Joint torque of {name} and its friction torque over time",
@@ -161,6 +162,7 @@ def _torque_panels(table: Table, j: int, name: str, factor: float, unit: str) ->
         f"torque ({unit})",
         draw.band(*_thinned_band(time, left - std, left + std), "± one standard deviation") if std.any() else [],
         draw.curve(time, left, "compensated torque", draw.BLUE, 1.0),
+        draw.stripes(labelled, "contact as labelled", draw.DARK, 0.1),
         contact,
         note=f"{rms(left):.3g} {unit} rms",
         size="medium",
@@ -177,34 +179,6 @@ def _thinned_band(
     begins = np.unique(np.linspace(0, len(time), _MOST, endpoint=False).astype(int))
     middles = (begins + np.append(begins[1:], len(time)) - 1) // 2
     return time[middles], np.minimum.reduceat(low, begins), np.maximum.reduceat(high, begins)
-
-
-def _events_sheet(
-    table: Table, joints: Sequence[str], tendons: Sequence[str], label: NDArray[Any] | None
-) -> draw.Sheet:
-    time = table["time"]
-    rows: list[tuple[str, str, str, list[draw.Interval]]] = []  # name, meaning, colour, stretches
-    if label is not None:
-        rows.append(("labelled contact", "contact as labelled", draw.DARK, flagged_stretches(time, label)))
-    for j, name in enumerate(joints, start=1):
-        found = flagged_stretches(time, table[f"joint_contact[{j}]"])
-        rows.append((f"contact, {name}", "contact as detected", draw.VERMILION, found))
-    for i, name in enumerate(tendons, start=1):
-        if slack := flagged_stretches(time, table[f"slack[{i}]"]):
-            rows.append((f"slack, {name}", "tendon slack", draw.ORANGE, slack))
-    shown = draw.panel(
-        "Over time",
-        "When contact was detected at each joint, and when a tendon was slack",
-        _TIME,
-        "",
-        *(draw.lane(row[3], k, row[1], row[2], 7.0) for k, row in enumerate(rows) if row[3]),
-        size="large" if len(rows) > 8 else "medium",
-        rows=[row[0] for row in rows],
-        x_limits=(float(time[0]), float(time[-1])) if time[-1] > time[0] else None,
-        zoom=ZOOM,
-    )
-    none = "" if shown.traces else "No contact was detected, and no tendon was slack."
-    return draw.Sheet("events", "events", "Contact and slack", [shown] if shown.traces else [], none)
 
 
 # --- the numbers ------------------------------------------------------------------------------------------------------

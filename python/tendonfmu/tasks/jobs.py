@@ -12,6 +12,7 @@ The calling process writes the rows, so workers need no shared disk for them.
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import sys
@@ -25,8 +26,7 @@ from typing import Any
 import numpy as np
 
 import tendonfmu
-from tendonfmu.errors import InputError, InternalError, refusal
-from tendonfmu.fault_report import fault_report
+from tendonfmu.errors import InputError, InternalError, fault_report, refusal
 from tendonfmu.files import check_output_folder, whole_file
 
 ROWS = "rows"
@@ -61,37 +61,28 @@ def rows_of(jobs: Sequence[Job], folder: Path) -> list[Row]:
     return [row for row in rows if row is not None]
 
 
-def waiting_jobs(jobs: Sequence[Job], folder: Path, keep_failed: bool = False) -> list[Job]:
-    """Return the jobs that have to run."""
-    rows = [_read_row(folder, job.name) for job in jobs]
-    return [job for job, row in zip(jobs, rows, strict=True) if row is None or (row.get("error") and not keep_failed)]
-
-
 def run_jobs(
     function: Function,
     jobs: Sequence[Job],
     folder: Path,
     client: Any = None,
-    *,
-    stop_after: float = math.inf,
-    keep_failed: bool = False,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> int:
     """Call the function for each job without a row, or whose row failed, and write its row when it ends."""
-    # stop_after: (s)
     _check_names(jobs)
     check_output_folder(folder)
     (folder / ROWS).mkdir(parents=True, exist_ok=True)
-    waiting = waiting_jobs(jobs, folder, keep_failed)
-    done = len(jobs) - len(waiting)
-    progress(done, len(jobs))
-    count = 0
-    for row in _rows(function, waiting, client, time.monotonic() + stop_after):
+    waiting = [job for job in jobs if (row := _read_row(folder, job.name)) is None or row.get("error")]
+    before = len(jobs) - len(waiting)
+    progress(before, len(jobs))
+    made = (
+        _rows_of_workers(function, waiting, client) if client is not None else (call(function, job) for job in waiting)
+    )
+    for count, row in enumerate(made, start=1):
         with whole_file(row_file(folder, row["name"])) as file:
             file.write_text(_json(row) + "\n", encoding="utf-8")
-        count += 1
-        progress(done + count, len(jobs))
-    return count
+        progress(before + count, len(jobs))
+    return len(waiting)
 
 
 def _check_names(jobs: Sequence[Job]) -> None:
@@ -147,33 +138,18 @@ def call(function: Function, job: Job) -> Row:
     return row | {"run_seconds": time.perf_counter() - begin, "cpu_seconds": time.process_time() - begin_cpu}
 
 
-def _rows(function: Function, jobs: Sequence[Job], client: Any, deadline: float) -> Iterator[Row]:
-    """Yield each row when its job ends."""
-    waiting = iter(jobs)
-
-    def next_job() -> Job | None:
-        return next(waiting, None) if time.monotonic() < deadline else None
-
-    if client is not None:
-        yield from _rows_of_workers(function, next_job, client)
-        return
-    while (job := next_job()) is not None:
-        yield call(function, job)
-
-
-def _rows_of_workers(function: Function, next_job: Callable[[], Job | None], client: Any) -> Iterator[Row]:
-    """Yield each row from the workers, with at most one running job per thread."""
+def _rows_of_workers(function: Function, jobs: Sequence[Job], client: Any) -> Iterator[Row]:
+    """Yield each row when its job ends, with at most one running job per thread of the workers."""
     import distributed
 
     library: Any = distributed  # distributed has no types
+    waiting = iter(jobs)
     under_way: dict[Any, Job] = {}
     pending = library.as_completed()
 
     def top_up() -> None:
-        while len(under_way) < max(1, sum(client.nthreads().values())):
-            job = next_job()
-            if job is None:
-                return
+        # a job that waits on a worker would be suspected as well if another one kills it
+        for job in itertools.islice(waiting, max(1, sum(client.nthreads().values())) - len(under_way)):
             future = client.submit(call, function, job, pure=False)
             under_way[future] = job
             pending.add(future)

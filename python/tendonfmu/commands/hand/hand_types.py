@@ -15,33 +15,21 @@ NAME = "[A-Za-z][A-Za-z0-9_-]{0,39}"
 MOST_FINGERS = 32
 
 
-def _columns(*groups: str) -> Schema:
-    text = {"type": "string", "minLength": 1}
-    names = [rf"^({'|'.join(groups)})\[[1-9][0-9]*\]$", *(["^contact$"] if "tendon_force" in groups else [])]
-    return Schema(additionalProperties=False, patternProperties=dict.fromkeys(names, text))
-
-
-# A prefix, such as index_ for index_tendon_force[1] and so on; or column of a finger -> column of the hand.
-FINGER = _columns("tendon_force", "tendon_position", "joint_position", "joint_velocity", "external_torque")
-Columns = Text | Annotated[dict[str, str], FINGER]
-WristColumns = Text | Annotated[dict[str, str], _columns("joint_position", "joint_velocity")]
-
-
 class FingerOfHand(TypedDict):
     # Name of the finger: of its folder, its FMU and its columns of results. No two alike.
     name: Annotated[str, Schema({"pattern": f"^{NAME}$", "not": {"enum": RESERVED}})]
     description: Text  # Path of the finger description, relative to this file.
-    columns: NotRequired[Columns]  # Its columns of the hand's recording [default: NAME.].
+    columns: NotRequired[Text]  # Prefix of its columns in the hand's recording, such as index_ [default: NAME.].
 
 
 class MeasuredWrist(TypedDict):
     joints: Annotated[list[Text], Schema(minItems=1)]  # Names of the joints, whose angles are measured.
-    columns: NotRequired[WristColumns]  # Columns of joint_position and joint_velocity [default: wrist.].
+    columns: NotRequired[Text]  # Prefix of its columns [default: wrist.].
 
 
 class DescribedWrist(TypedDict):
     description: Text  # Path of the description of the wrist, which has tendons of its own.
-    columns: NotRequired[Columns]  # Columns of its tendons [default: wrist.].
+    columns: NotRequired[Text]  # Prefix of its columns [default: wrist.].
 
 
 class HandFile(TypedDict):

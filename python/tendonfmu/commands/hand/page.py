@@ -1,13 +1,12 @@
-"""The page of a hand: a drawing, and a row for each finger, the worst first, with a link to its own page.
+"""The page of a hand: a row for each finger, the worst first, with a link to its own page. The terminal shows the same.
 
-Rows are of a calibration, a diagnosis, a history or a score; the terminal shows the same.
+A row is of a calibration, a diagnosis, a history or a score.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,195 +15,115 @@ from markupsafe import Markup
 from tendonfmu import report as reporting
 from tendonfmu.calibration import text
 from tendonfmu.commands.hand.description import Hand, HandPart
-from tendonfmu.commands.hand.hand_types import WRIST
-from tendonfmu.commands.score import ScoreResult
-from tendonfmu.diagnosis import History, Names
-from tendonfmu.files import counted, html_template, listed, percent, write_text
+from tendonfmu.diagnosis import Diagnosis, History, at_place, names_in, reported_causes
+from tendonfmu.files import counted, listed, percent, write_text
 
 PAGE = "hand.html"
-COLOURS = {"fine": "#7fc9b3", "doubt": "#e69f00", "bad": "#d55e00", "failed": "#b4bcc4"}  # of the tones
-
-# lengths of the drawing in CSS pixels, y downward; a page shrinks it to its width
-SPACING, THICK = 82.0, 24.0  # between fingers, and of one
-LONGEST, PER_JOINT = 136.0, 36.0  # a finger, and each of its joints
-PALM, HEAD = 96.0, 60.0  # heights of the palm and of the room above it for two lines of text
-SPREAD = math.radians(5.0)  # between neighbours
 FAR = 2.0  # times the median error of the fingers from which on a finger stands out
 MUCH = 0.25  # share of an error beyond noise from which on a finger is bad
 Report = Mapping[str, Any]
 
 
-@dataclass(frozen=True)
-class PartResult:
-    """What became of a part."""
-
-    part: HandPart
-    report: Mapping[str, Any] | None  # as its own command writes it; None if it failed
-    reason: str = ""  # why it failed
-    history: History | None = None
-
-
-def names_of(part: HandPart) -> Names:
-    """Return the names of joints and tendons."""
-    return Names(tuple(part.finger.joint_names), tuple(part.finger.tendon_names))
-
-
 class PartRow(NamedTuple):
     """A finger on the page and on the terminal."""
 
-    name: str
     tone: str  # fine, doubt, bad or failed
     badness: float  # the larger, the worse
-    value: str  # what it is judged by, short
-    sentence: str  # the same in words
-    cells: tuple[str, ...]
-    page: str = ""  # its own page in its folder, if it has one
+    sentence: str  # what it is judged by
+    cells: Sequence[str]
+    name: str = ""
     reason: str = ""  # why it failed
 
 
 class Kind(NamedTuple):
-    """What a page of a hand is about."""
+    """What a table of fingers is about."""
 
     name: str
-    rows: Callable[[Hand, Sequence[PartResult]], list[PartRow]]
     headings: tuple[str, ...]
-    meanings: tuple[str, str, str]  # of the tones fine, doubt and bad
-    caption: str
-
-    @property
-    def format(self) -> str:
-        """Format of what `--json` prints."""
-        return f"tendonfmu-hand-{self.name}-1"
-
-
-def calibration_rows(hand: Hand, results: Sequence[PartResult]) -> list[PartRow]:
-    """Return a row for each finger: errors before and after, causes built in, false alarms, pushes."""
-
-    def error(result: PartResult, report: Report, name: str = "calibrated") -> float:
-        return _own(hand, result, report["error"][name])
-
-    errors = sorted(error(result, result.report) for result in results if result.report)
-
-    def row(result: PartResult, report: Report) -> PartRow:
-        left = error(result, report)
-        poor = text.verdict(report)[0] == "bad"
-        tone = "bad" if poor else "doubt" if left > FAR * errors[len(errors) // 2] else "fine"
-        before = error(result, report, "previous" if "previous" in report["error"] else "as_given")
-        alarms, pushes = report["alarms"], report["pushes"]
-        cells = (
-            f"{_mnm(before)} → {_mnm(left)} mN·m",
-            ", ".join(cause["title"] for cause in report["structure"]["causes"]) or "nothing",
-            f"{alarms['alarms']} in {alarms['minutes']:.2g} min",
-            "–" if pushes is None else f"{pushes['found']} of {pushes['events']}",
-        )
-        value = f"{_mnm(left)} mN·m"
-        sentence = f"{value} are left on unseen motion"
-        return PartRow(result.part.name, tone, left, value, sentence, cells, "calibration.html")
-
-    return _rows(results, row)
-
-
-def diagnosis_rows(hand: Hand, results: Sequence[PartResult]) -> list[PartRow]:
-    """Return a row for each finger: verdict, causes, error, and how much of it is beyond noise."""
-
-    def row(result: PartResult, report: reporting.DiagnosisReport) -> PartRow:
-        adequate = report["verdict"] == "adequate"
-        wrong = share_that_is_wrong(report)
-        causes = [" ".join(filter(None, (cause["title"], _place(result, cause)))) for cause in report["causes"]]
-        more = f", and {len(causes) - 2} more" if len(causes) > 2 else ""
-        nominal = f"{_mnm(_own(hand, result, report['nominal']['test_rms']))} mN·m"
-        cells = (report["verdict"], ("; ".join(causes[:2]) + more) or "–", nominal, percent(wrong))
-        tone = "fine" if adequate else "bad" if wrong >= MUCH else "doubt"
-        value, sentence = (
-            "adequate" if adequate else percent(wrong),
-            f"{percent(wrong)} of its error is more than noise",
-        )
-        badness = 0.0 if adequate else wrong
-        return PartRow(result.part.name, tone, badness, value, sentence, cells, "diagnosis.html")
-
-    return _rows(results, row)
-
-
-def history_rows(hand: Hand, results: Sequence[PartResult]) -> list[PartRow]:
-    """Return a row for each finger: how many changes, the first of them, and recordings that were left out."""
-
-    def row(result: PartResult, report: Report) -> PartRow:
-        history = result.history
-        assert history is not None
-        names = names_of(result.part)
-        worst = max((size.gain for line in history.lines for size in line.sizes), default=0.0)
-        count = len(history.lines)
-        cells = (
-            reporting.headline(history).rstrip("."),
-            reporting.capital(reporting.trend_sentence(history.lines[0], history, names)) if count else "–",
-            percent(worst) if count else "–",
-            ", ".join(f"{name.rsplit('/', 1)[-1]}: {why}" for name, why in history.failed) or "none",
-        )
-        tone = "fine" if not count and not history.different else "bad" if worst >= MUCH else "doubt"
-        value = counted(count, "change")
-        return PartRow(result.part.name, tone, worst, value, value, cells, "history.html")
-
-    return _rows(results, row)
+    page: str = ""  # the page of a finger
+    caption: str = ""
 
 
 CALIBRATION = Kind(
     "calibration",
-    calibration_rows,
     ("error on unseen motion", "added to the model", "false alarms", "pushes found"),
-    ("calibrated", "its error is more than twice that of the hand's median finger", "no better than before"),
-    "Above each finger: rms of what the model leaves of the torques of its joints on unseen motion.",
+    "calibration.html",
+    "Error: rms of what the model leaves of the torques of the finger's joints, before and after.",
 )
 DIAGNOSIS = Kind(
     "diagnosis",
-    diagnosis_rows,
     ("verdict", "causes", "error", "more than noise"),
-    (
-        "adequate",
-        f"more than noise: below {percent(MUCH)} of its error",
-        f"more than noise: {percent(MUCH)} of its error and above",
-    ),
-    "Above each finger: the share of its error that is more than noise, explained by causes or not.",
+    "diagnosis.html",
+    "More than noise: the share of the error that causes explain, or that nothing does.",
 )
-HISTORY = Kind(
-    "history",
-    history_rows,
-    ("changes", "the first", "largest share of the error", "left out"),
-    (
-        "nothing has changed",
-        f"a change makes less than {percent(MUCH)} of the error",
-        f"a change makes {percent(MUCH)} or more",
-    ),
-    "Above each finger: the number of changes.",
-)
-SCORE_HEADINGS = ("found", "false alarms", "median delay", "free rms, mN·m")
+HISTORY = Kind("history", ("changes", "the first", "largest share of the error", "left out"), "history.html")
+SCORE = Kind("score", ("found", "false alarms", "median delay", "free rms, mN·m"))
 
 
-def score_rows(scores: Mapping[str, ScoreResult], failed: Mapping[str, str]) -> list[PartRow]:
-    """Return a row for each finger: events found, false alarms, delay, torque in free motion."""
-    rows = []
-    for name, score in scores.items():
-        minutes = float(score.report["free_minutes"] or 0.0)
-        missed = 1.0 - score.found / score.events if score.events else 0.0
-        badness = missed + 1e-3 * score.false_alarms / max(minutes, 1e-9)
-        cells = (
-            f"{score.found} of {score.events}" if score.events else "–",
-            f"{score.false_alarms} in {minutes:.2g} min",
-            "–" if math.isnan(score.median_delay) else f"{1e3 * score.median_delay:.0f} ms",
-            ", ".join(_mnm(value) for value in score.report["free_rms"]),
-        )
-        rows.append(PartRow(name, "fine", badness, "", "", cells))
-    rows += [PartRow(name, "failed", -1.0, "", "", ("–",) * 4, reason=why) for name, why in failed.items()]
-    return sorted(rows, key=lambda row: -row.badness)
+def calibration_row(part: HandPart, report: Report) -> PartRow:
+    """Say how large the errors are before and after, which causes are built in, and what is detected."""
+    first = "previous" if "previous" in report["error"] else "as_given"
+    before, left = (_own(part, report["error"][name]) for name in (first, "calibrated"))
+    alarms, pushes = report["alarms"], report["pushes"]
+    cells = (
+        f"{_mnm(before)} → {_mnm(left)} mN·m",
+        ", ".join(cause["title"] for cause in report["structure"]["causes"]) or "nothing",
+        f"{alarms['alarms']} in {alarms['minutes']:.2g} min",
+        "–" if pushes is None else f"{pushes['found']} of {pushes['events']}",
+    )
+    tone = "bad" if text.verdict(report)[0] == "bad" else "fine"
+    return PartRow(tone, left, f"{_mnm(left)} mN·m are left on unseen motion", cells)
 
 
-def share_that_is_wrong(report: reporting.DiagnosisReport) -> float:
-    """Return the share of a finger's error that is more than noise: what causes explain, and what nothing does."""
-    gain, unexplained = report["gain"]["value"] or 0.0, report["unexplained"]["share"] or 0.0
-    return 1.0 - (1.0 - gain) * math.sqrt(max(1.0 - unexplained, 0.0))
+def stand_out(rows: Sequence[PartRow]) -> list[PartRow]:
+    """Return rows of calibrations that doubt a finger whose error is far above that of the others."""
+    errors = sorted(row.badness for row in rows if row.tone != "failed")
+    far = FAR * errors[len(errors) // 2]
+    return [row._replace(tone="doubt") if row.tone == "fine" and row.badness > far else row for row in rows]
+
+
+def diagnosis_row(part: HandPart, found: Diagnosis) -> PartRow:
+    """Say verdict, causes, error, and how much of it is beyond noise: what causes explain, and what nothing does."""
+    gain, left = (0.0 if math.isnan(share) else share for share in (found.gain.value, found.unexplained.share))
+    wrong = 1.0 - (1.0 - gain) * math.sqrt(max(1.0 - left, 0.0))
+    causes = [at_place(cause.title, cause.where, names_in(part.finger.data)) for cause in reported_causes(found)]
+    more = f"; and {len(causes) - 2} more" if len(causes) > 2 else ""
+    error = f"{_mnm(_own(part, found.nominal.test_rms))} mN·m"
+    cells = (found.verdict, ("; ".join(causes[:2]) + more) or "–", error, percent(wrong))
+    adequate = found.verdict == "adequate"
+    tone = "fine" if adequate else "bad" if wrong >= MUCH else "doubt"
+    return PartRow(tone, 0.0 if adequate else wrong, f"{percent(wrong)} of its error is more than noise", cells)
+
+
+def history_row(part: HandPart, history: History) -> PartRow:
+    """Say how many changes there are, the first of them, and which recordings were left out."""
+    count, names = len(history.lines), names_in(part.finger.data)
+    worst = max((size.gain for line in history.lines for size in line.sizes), default=0.0)
+    cells = (
+        reporting.headline(history).rstrip("."),
+        reporting.capital(reporting.trend_sentence(history.lines[0], history, names)) if count else "–",
+        percent(worst) if count else "–",
+        ", ".join(f"{name.rsplit('/', 1)[-1]}: {why}" for name, why in history.failed) or "none",
+    )
+    tone = "fine" if not count and not history.different else "bad" if worst >= MUCH else "doubt"
+    return PartRow(tone, worst, counted(count, "change"), cells)
+
+
+def score_row(report: Report) -> PartRow:
+    """Say which events were found, false alarms, delay, and the torque in free motion."""
+    events, found, alarms, minutes = (report[key] for key in ("events", "found", "false_alarms", "free_minutes"))
+    badness = (1.0 - found / events if events else 0.0) + 1e-3 * alarms / max(minutes or 0.0, 1e-9)
+    cells = (
+        f"{found} of {events}" if events else "–",
+        f"{alarms} in {minutes or 0.0:.2g} min",
+        "–" if report["median_delay_s"] is None else f"{1e3 * report['median_delay_s']:.0f} ms",
+        ", ".join(map(_mnm, report["free_rms"])),
+    )
+    return PartRow("fine", badness, "", cells)
 
 
 def shared_warnings(warnings: Mapping[str, Sequence[str]]) -> list[str]:
-    """Return each warning once, with the names of all parts that it is about before it."""
+    """Return each warning once, with the names of all fingers that it is about before it."""
     names: dict[str, list[str]] = {}
     for name, sentences in warnings.items():
         for sentence in sentences:
@@ -212,36 +131,13 @@ def shared_warnings(warnings: Mapping[str, Sequence[str]]) -> list[str]:
     return [f"{', '.join(of_sentence)}: {sentence}" for sentence, of_sentence in names.items()]
 
 
-# --- parts ------------------------------------------------------------------------------------------------------------
-
-
-def _rows(results: Sequence[PartResult], row: Callable[[PartResult, Any], PartRow]) -> list[PartRow]:
-    """Return the rows, worst first; those of failed parts come last."""
-    done = [row(result, result.report) for result in results if result.report is not None]
-    done.sort(key=lambda each: -each.badness)
-    empty = ("–",) * len(done[0].cells)
-    return done + [
-        PartRow(result.part.name, "failed", -1.0, "left out", "left out", empty, reason=result.reason)
-        for result in results
-        if result.report is None
-    ]
-
-
-def _own(hand: Hand, result: PartResult, values: Sequence[float | None]) -> float:
+def _own(part: HandPart, values: Sequence[float | None]) -> float:
     """Return the rms of all joints of a finger together; a shared wrist is no joint of the finger."""
-    return reporting.together(reporting.column(values[hand.shared_joints(result.part) :]))
+    return reporting.together(reporting.column(values[part.shared :]))
 
 
 def _mnm(value: float | None) -> str:
     return "–" if value is None else reporting.rounded(1e3 * value)
-
-
-def _place(result: PartResult, cause: reporting.CauseEntry) -> str:
-    """Return where a cause is, by the names of joint and tendon."""
-    finger = result.part.finger
-    words = [f"at {finger.joint_names[cause['joint'] - 1]}"] if cause["joint"] else []
-    words += [f"on {finger.tendon_names[cause['tendon'] - 1]}"] if cause["tendon"] else []
-    return f"({' '.join(words)})" if words else ""
 
 
 # --- the page ---------------------------------------------------------------------------------------------------------
@@ -259,18 +155,15 @@ def write_hand_page(
 ) -> None:
     """Write the page into the folder in which each finger has its own."""
     tones = {row.tone for row in rows}
-    meanings = zip(COLOURS, (*kind.meanings, "left out"), strict=True)
     page = reporting.render(
         "hand.html.jinja",
         hand=hand.name,
         kicker=f"{kind.name} of a hand",
         verdict=verdict(rows),
         tone="bad" if tones & {"bad", "failed"} else "" if "doubt" in tones else "good",
-        drawing=hand_svg(hand, rows),
-        keys=[(COLOURS[tone], meaning) for tone, meaning in meanings if tone in tones],
         caption=kind.caption,
         headings=("finger", *kind.headings),
-        rows=[(_linked(row), *row.cells) for row in rows],
+        rows=[(_linked(row, kind), *row.cells) for row in rows],
         doubtful=[row.tone in ("bad", "failed") for row in rows],
         failed=[(row.name, row.reason) for row in rows if row.reason],
         recordings=[(role, list(map(str, group))) for role, group in recordings.items()],
@@ -294,50 +187,5 @@ def verdict(rows: Sequence[PartRow]) -> str:
     return " ".join(sentences)
 
 
-def _link(row: PartRow) -> str:
-    return f"{row.name}/{row.page}" if row.page else ""
-
-
-def _linked(row: PartRow) -> str:
-    return Markup('<a href="{}">{}</a>').format(_link(row), row.name) if row.page else row.name
-
-
-# --- the drawing ------------------------------------------------------------------------------------------------------
-
-
-def hand_svg(hand: Hand, rows: Sequence[PartRow]) -> Markup:
-    """Draw palm and fingers side by side as SVG, each in the colour of how well it does, with a link to its page."""
-    of, count = {row.name: row for row in rows}, len(hand.fingers)
-    width, palm = SPACING * max(count, 4) + 12.0, SPACING * max(count, 2) * 0.86
-    drawing = html_template("hand_svg.html.jinja").render(
-        name=hand.name,
-        width=round(width),
-        height=round(HEAD + LONGEST + PALM + (64.0 if WRIST in of else 8.0)),
-        thick=THICK,
-        palm=(round(0.5 * (width - palm), 1), HEAD + LONGEST - 9.0, round(palm, 1), PALM),
-        fingers=[
-            _drawn(of[part.name])
-            | _at(part, part.finger.joints - hand.shared_joints(part), k - 0.5 * (count - 1), width)
-            for k, part in enumerate(hand.fingers)
-        ],
-        wrist=_drawn(of[WRIST]) if WRIST in of else None,
-    )
-    return Markup(drawing)
-
-
-def _drawn(row: PartRow) -> dict[str, Any]:
-    return {"row": row, "link": _link(row), "colour": COLOURS[row.tone]}
-
-
-def _at(part: HandPart, joints: int, beside: float, width: float) -> dict[str, Any]:
-    """Return root, tip and joints of a finger, `beside` fingers to the right of the middle."""
-    root = (round(0.5 * width + 0.82 * SPACING * beside, 1), HEAD + LONGEST)
-    length = min(LONGEST, 10.0 + PER_JOINT * joints) * (1.0 - 0.05 * abs(beside))
-    length *= 0.8 if "thumb" in part.name.lower() else 1.0
-    angle = SPREAD * beside
-
-    def at(share: float) -> tuple[float, float]:
-        x, y = root[0] + share * length * math.sin(angle), root[1] - share * length * math.cos(angle)
-        return round(x, 1), round(y, 1)
-
-    return {"root": root, "tip": at(1.0), "joints": [at((j + 0.68) / joints) for j in range(joints)]}
+def _linked(row: PartRow, kind: Kind) -> str:
+    return row.name if row.reason else Markup('<a href="{}/{}">{}</a>').format(row.name, kind.page, row.name)

@@ -1,27 +1,36 @@
-"""How the recording of a hand is split into recordings of its parts, with the angles of the wrist that they share."""
+"""How the recording of a hand is split into recordings of its parts, with the angles of the wrist, and run."""
 
 from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
-from functools import partial
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tendonfmu.arrays import Numbers
-from tendonfmu.commands.hand.description import POSITIONS, Hand, HandPart
+from tendonfmu.commands.hand.description import Hand, HandPart, read_hand
 from tendonfmu.commands.hand.hand_types import WRIST
+from tendonfmu.commands.run import RunResult
+from tendonfmu.commands.run import run as run_finger
 from tendonfmu.errors import InputError, InputWarning
-from tendonfmu.files import Table, counted, is_frame, path_of, read_table, table_of_frame
+from tendonfmu.files import Table, frame_of, is_frame, path_of, read_table, table_of_frame, write_table
 from tendonfmu.fmu import run_model
 from tendonfmu.model import moment_arms, tendon_positions
-from tendonfmu.recordings import GROUP_PER, GROUPS, LABEL, Recording, RecordingSource, element_of, right_spelling
+from tendonfmu.options import RunOptions
+from tendonfmu.recordings import GROUPS, LABEL, Recording, RecordingSource
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 HandRecording: TypeAlias = "RecordingSource"  # a file, or a DataFrame
+POSITIONS = ("joint_position", "joint_velocity")  # groups of the joints that fingers and wrist share
+SUMMED = ("compensated_torque", "joint_torque", "friction_torque", "bias_torque")
+MOTION = ("joint_angle", "joint_speed")
 
 
 def split_recording(hand: Hand, source: HandRecording, others: Collection[str] = ()) -> dict[str, Recording]:
@@ -66,124 +75,88 @@ def split_parts(
 ) -> tuple[dict[str, Recording], dict[str, str]]:
     """Split a recording, and say why parts have none, by the names of the parts. Nothing is there without the wrist."""
     file, table = _table(hand, source, others)
-    own = hand.wrist.part if hand.wrist else None
-    wrist = None if own is None else _recording(file, table, own, 0, others)
-    shared = _wrist_motion(file, table, hand, wrist) if hand.wrist else None
+    wrist = hand.wrist.part if hand.wrist else None
+    last = {} if wrist is None else {WRIST: _recording(file, table, wrist, {}, others)}
+    motion = _wrist_motion(file, table, hand, last)
     recordings, failed = dict[str, Recording](), dict[str, str]()
     for part in hand.fingers:
         try:
-            recording = _recording(file, table, part, hand.wrist_joints, others)
-            recordings[part.name] = recording if shared is None else _with_wrist(hand, part, recording, table, shared)
+            recordings[part.name] = _recording(file, table, part, motion, others)
         except InputError as refused:
             failed[part.name] = str(refused)
-    return recordings | ({} if wrist is None else {WRIST: wrist}), failed
-
-
-# --- the table --------------------------------------------------------------------------------------------------------
+    return recordings | last, failed
 
 
 def _table(hand: Hand, source: HandRecording, others: Collection[str]) -> tuple[Path, Table]:
-    flags = {LABEL, *others, *(part.columns[LABEL] for part in hand.parts if LABEL in part.columns)}
-    check = partial(_columns_to_read, hand, others)
+    """Read the columns that belong to the hand; warn of the others."""
+    prefixes = [*(part.prefix for part in hand.parts), *([hand.wrist.prefix] if hand.wrist else [])]
+
+    def ours(file: Path, names: list[str]) -> list[str]:
+        known = {name for name in names if name in ("time", LABEL, *others) or name.startswith(tuple(prefixes))}
+        if "time" not in names:
+            raise InputError(f"{file}: no column time; expected the time of every sample in s")
+        if ignored := [repr(name) for name in names if name not in known]:
+            listed = ", ".join(ignored[:6]) + (f" and {len(ignored) - 6} more" if len(ignored) > 6 else "")
+            words = f"{file}: ignored columns: {listed}; no finger of {hand.path} has them"
+            warnings.warn(words, InputWarning, stacklevel=2)
+        return [name for name in names if name in known]
+
+    flags = {LABEL, *others, *(f"{prefix}{LABEL}" for prefix in prefixes)}
     if is_frame(source):
-        return Path("DataFrame"), table_of_frame(Path("DataFrame"), source, check, flags=flags)
+        return Path("DataFrame"), table_of_frame(Path("DataFrame"), source, ours, flags=flags)
     if not isinstance(source, str | os.PathLike):
         raise InputError(f"recording: {type(source).__name__}; expected a path or a DataFrame of the whole hand")
-    file = path_of(source)
-    return file, read_table(file, check, flags=flags)
+    return path_of(source), read_table(path_of(source), ours, flags=flags)
 
 
-def _columns_to_read(hand: Hand, others: Collection[str], file: Path, names: list[str]) -> list[str]:
-    """Return the columns of a table that belong to the hand; warn of the others."""
-    known = {"time", LABEL, *others}
-    for part in hand.parts:
-        known |= {*part.columns.values(), *(f"{part.prefix}{name}" for name in others if part.prefix is not None)}
-    if hand.wrist:
-        known |= set(hand.wrist.columns.values())
-    if "time" not in names:
-        raise InputError(f"{file}: no column time; expected the time of every sample in s")
-    ignored = [name for name in names if name not in known]
-    for name in ignored:
-        for part in hand.parts:
-            if part.prefix is not None and name.startswith(part.prefix):
-                _check_spelling(file, part, name)
-    if ignored:
-        listed = ", ".join(map(repr, ignored[:6])) + (f" and {len(ignored) - 6} more" if len(ignored) > 6 else "")
-        warnings.warn(
-            f"{file}: ignored columns: {listed}; no finger of {hand.path} has them", InputWarning, stacklevel=2
-        )
-    return [name for name in names if name in known]
-
-
-def _check_spelling(file: Path, part: HandPart, name: str) -> None:
-    """Refuse a column that is one of a part in another spelling, or beyond its joints and tendons."""
-    rest = name[len(part.prefix or "") :]
-    element, right = element_of(rest), right_spelling(rest)
-    if element and element[0] in GROUPS:
-        finger = part.finger
-        size = f"{counted(finger.joints, 'joint')} and {counted(finger.tendons, 'tendon')}"
-        raise InputError(f"{file}: column {name!r}; expected none of this number, since {part.name} has {size}")
-    if right is not None:
-        raise InputError(f"{file}: column {name!r}; expected the name {part.prefix}{right}")
-
-
-# --- a part -----------------------------------------------------------------------------------------------------------
-
-
-def _recording(file: Path, table: Table, part: HandPart, shared: int, others: Collection[str]) -> Recording:
-    """Make the recording of a part. With shared joints it has no positions yet."""
-    groups = {}
-    for group, (unit, required) in GROUPS.items():
-        size = part.finger.tendons if GROUP_PER[group] == "tendon" else part.finger.joints
-        if shared and group in POSITIONS:
-            continue
-        columns = _group(file, table, part, [f"{group}[{i}]" for i in range(1, size + 1)])
-        if columns is not None:
-            groups[group] = columns
-        elif required:
-            name = part.columns[f"{group}[1]"]
-            raise InputError(
-                f"{file}: no column {name}; expected {counted(size, 'column')} with {group} of {part.name}, in {unit}"
-            )
-    label = part.columns.get(LABEL, LABEL)
-    recording = Recording.from_arrays(
-        table["time"],
-        groups.pop("tendon_force"),
-        groups.pop("tendon_position"),
-        contact=table.get(label, table.get(LABEL)),
-        name=f"{file}:{part.name}",
-        **groups,
-    )
-    kept = {name: table.get(f"{part.prefix}{name}", table.get(name)) for name in others}
-    return replace(recording, others={name: values for name, values in kept.items() if values is not None})
-
-
-def _group(file: Path, table: Table, part: HandPart, names: Sequence[str]) -> Numbers | None:
-    """Return the columns of a group [N, k]; None if there is none of them."""
-    listed = {name: part.columns[name] for name in names if name in part.columns}
-    if not any(theirs in table for theirs in listed.values()):
-        return None
-    for name in names:
-        if listed.get(name) not in table:
-            wanted = listed.get(name, name)
-            raise InputError(f"{file}: no column {wanted}; expected {names[0]} to {names[-1]} of {part.name}, or none")
-    return np.column_stack([table[listed[name]] for name in names])
+def _recording(
+    file: Path, table: Table, part: HandPart, wrist: Mapping[str, Numbers], others: Collection[str]
+) -> Recording:
+    """Make the recording of a part, checked as that of a finger. wrist: motion of the joints that it shares, [N, w]."""
+    columns = {name: table[name] for name in ("time", LABEL, *others) if name in table}
+    columns |= {
+        theirs.removeprefix(part.prefix): values
+        for theirs, values in table.items()
+        if theirs.startswith(part.prefix) and theirs not in others
+    }
+    name, finger = f"{file}:{part.name}", part.finger
+    for group in POSITIONS if part.shared else ():
+        behind = {f"{group}[{j}]" for j in range(part.shared + 1, finger.joints + 1)} & columns.keys()
+        for j in range(1, part.shared + 1):
+            if f"{group}[{j}]" in columns:
+                raise InputError(
+                    f"{file}: column {part.prefix}{group}[{j}]; expected none, since joint {j} of {part.name} is "
+                    "the wrist's, whose columns are read"
+                )
+        if behind and group in wrist:
+            columns |= {f"{group}[{j}]": values for j, values in enumerate(wrist[group].T, start=1)}
+        for column in behind if group not in wrist else ():
+            del columns[column]
+    recording = Recording.from_frame(frame_of(columns), name=name, others=others)
+    recording.require(finger.joints, finger.tendons, ())
+    if not part.shared or "joint_position" in recording.groups:
+        return recording
+    angles = _angles_beyond(finger.data, recording.groups, wrist["joint_position"])
+    groups = {**recording.groups, "joint_position": np.column_stack([wrist["joint_position"], angles])}
+    return replace(recording, groups={name: groups[name] for name in GROUPS if name in groups})
 
 
 # --- the wrist --------------------------------------------------------------------------------------------------------
 
 
-def _wrist_motion(file: Path, table: Table, hand: Hand, recording: Recording | None) -> Mapping[str, Numbers]:
-    """Return the positions [N, w] (rad), and the velocities (rad/s) where they are measured."""
-    assert hand.wrist is not None
-    if recording is not None and hand.wrist.part is not None:
-        measured = {group: recording.groups[group] for group in POSITIONS if group in recording.groups}
-        if "joint_position" not in measured:
-            measured["joint_position"] = run_model(hand.wrist.part.finger, recording)["joint_angle"]
-        return measured
+def _wrist_motion(file: Path, table: Table, hand: Hand, own: Mapping[str, Recording]) -> dict[str, Numbers]:
+    """Return angles and, if measured, velocities of the wrist [N, w]. own: its recording, if it has tendons."""
+    if hand.wrist is None:
+        return {}
+    if hand.wrist.part:
+        recording = own[WRIST]
+        motion = {group: recording.groups[group] for group in POSITIONS if group in recording.groups}
+        if "joint_position" not in motion:
+            motion["joint_position"] = run_model(hand.wrist.part.finger, recording)["joint_angle"]
+        return motion
     motion = {}
     for group in POSITIONS:
-        names = [hand.wrist.columns.get(f"{group}[{j}]", "") for j in range(1, hand.wrist_joints + 1)]
+        names = [f"{hand.wrist.prefix}{group}[{j}]" for j in range(1, len(hand.wrist.joints) + 1)]
         missing = [name for name in names if name not in table]
         if not missing:
             motion[group] = np.column_stack([table[name] for name in names])
@@ -193,32 +166,86 @@ def _wrist_motion(file: Path, table: Table, hand: Hand, recording: Recording | N
     return motion
 
 
-def _with_wrist(
-    hand: Hand, part: HandPart, recording: Recording, table: Table, wrist: Mapping[str, Numbers]
-) -> Recording:
-    """Return the recording of a finger with the positions of all joints, and velocities where all are measured."""
-    shared, finger, file = hand.wrist_joints, part.finger, Path(recording.path)
-    groups = dict(recording.groups)
-    for group in POSITIONS:
-        names = [f"{group}[{j}]" for j in range(1, finger.joints + 1)]
-        for name in names[:shared]:
-            if part.columns.get(name) in table:
-                raise InputError(
-                    f"{file}: column {part.columns[name]}; expected none, since joint {name[len(group) + 1 : -1]} of "
-                    f"{part.name} is the wrist's, whose columns are read"
-                )
-        measured = _group(file, table, part, names[shared:])
-        if measured is None and group == "joint_position":
-            measured = _angles_beyond(finger.data, groups, wrist[group])
-        if measured is not None and group in wrist:
-            groups[group] = np.column_stack([wrist[group], measured])
-    ordered = {name: groups[name] for name in GROUPS if name in groups}
-    return replace(recording, groups=ordered)
-
-
 def _angles_beyond(data: Mapping[str, object], groups: Mapping[str, Numbers], wrist: Numbers) -> Numbers:
     """Return the angles [N, n − w] (rad) that tendons and wrist [N, w] give, q_f = R_f⁺ (x1 − R_w q_w)."""
     arms, count = moment_arms(data), wrist.shape[1]
     known = np.column_stack([wrist, np.zeros((len(wrist), arms.shape[1] - count))])
     beyond = groups["tendon_position"] - tendon_positions(data, known, groups["tendon_force"])
     return np.asarray(beyond @ np.linalg.pinv(arms[:, count:], rcond=1e-15).T)
+
+
+# --- run --------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class HandRun:
+    """What a hand makes of a recording.
+
+    Attributes
+    ----------
+    results
+        The result of each part, by its name.
+    wrist
+        Torques of all tendons that pass the wrist, and its motion, by name [N, w]; empty without a wrist.
+    """
+
+    results: Mapping[str, RunResult]
+    wrist: Mapping[str, NDArray[Any]]
+
+    def __repr__(self) -> str:
+        return f"<HandRun: {'; '.join(f'{name}: {result.summary}' for name, result in self.results.items())}>"
+
+    @property
+    def frame(self) -> pd.DataFrame:
+        """All outputs as a pandas DataFrame, with the columns that `tendonfmu run` writes."""
+        return frame_of(self.columns())
+
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Return all outputs by column [N], such as `index.joint_torque[2]`, `time` first."""
+        columns: dict[str, NDArray[Any]] = {"time": next(iter(self.results.values())).outputs["time"]}
+        for name, result in self.results.items():
+            columns |= {f"{name}.{column}": values for column, values in result.columns().items() if column != "time"}
+        for name, values in self.wrist.items():  # in the place of those of the wrist's own tendons
+            columns |= {f"{WRIST}.{name}[{j}]": column for j, column in enumerate(values.T, start=1)}
+        return columns
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Write all outputs as .csv or .parquet, whole or not at all. Raises InputError if that is not possible."""
+        write_table(path, self.columns())
+
+
+def run_hand(hand: Hand | str | os.PathLike[str], recording: HandRecording, *, kinematics: int = 1) -> HandRun:
+    """Run all fingers of a hand over a recording.
+
+    Parameters
+    ----------
+    hand
+        A hand, or the file of it.
+    recording
+        A .csv or .parquet file, or a pandas DataFrame, with the columns of all fingers.
+    kinematics
+        1 tendon positions, 2 measured joint positions, 3 joint positions and velocities. Fingers with a shared wrist
+        take at least 2.
+
+    Returns
+    -------
+    HandRun
+        All outputs of all fingers. With a wrist, its torques are the sums over all tendons that pass it.
+
+    Raises
+    ------
+    InputError
+        The hand or the recording is refused, or they do not fit.
+    """
+    asked = RunOptions(kinematics=kinematics).kinematics
+    given = read_hand(hand)
+    recordings = split_recording(given, recording)
+    results = {
+        part.name: run_finger(part.finger, recordings[part.name], kinematics=part.kinematics(asked))
+        for part in given.parts
+    }
+    if given.wrist is None:
+        return HandRun(results, {})
+    count, outputs = len(given.wrist.joints), [results[part.name].outputs for part in given.parts]
+    summed = {name: np.sum([each[name][:, :count] for each in outputs], axis=0) for name in SUMMED}
+    return HandRun(results, summed | {name: outputs[0][name][:, :count] for name in MOTION})

@@ -58,7 +58,7 @@ def _system_structure(hand: Hand) -> bytes:
                 *((name, "input") for name, _ in inputs),
                 *((name, "output") for name in _names(OUTPUTS, part.finger.joints)),
             ],
-            *([_taking_joints()] if hand.shared_joints(part) else []),
+            *([_taking_joints()] if part.shared else []),
         )
         for part, inputs in inside
     )
@@ -83,7 +83,7 @@ def _inputs(hand: Hand, part: HandPart) -> Iterator[tuple[str, tuple[str, str]]]
     """Yield each input of a part and where it comes from: (element, connector), "" for the system."""
     for name in _names(TENDONS, part.finger.tendons):
         yield name, ("", f"{part.name}_{name}")
-    shared = hand.shared_joints(part)
+    shared = part.shared
     if not shared:
         return
     described = hand.wrist is not None and hand.wrist.part is not None
@@ -108,7 +108,7 @@ def _taking_joints() -> Any:
 
 def _start_values(hand: Hand, start: HandRecording | None) -> dict[str, float | int]:
     """Return the inputs at the first sample, and the kinematics source of fingers with a shared wrist."""
-    values: dict[str, float | int] = {f"{part.name}.{KINEMATICS}": 2 for part in hand.parts if hand.shared_joints(part)}
+    values: dict[str, float | int] = {f"{part.name}.{KINEMATICS}": 2 for part in hand.parts if part.shared}
     if start is not None:
         for name, recording in split_parts(hand, start)[0].items():
             part = next(part for part in hand.parts if part.name == name)

@@ -1,35 +1,45 @@
-"""What the figures of a score and of a tuning show, ready to be drawn.
+"""How a score and a tuning read in terminal and notebook, from their reports, and what their figures show.
 
-Torques and detection over time (fig. 8 of the paper), every event from its onset on, the ROC, and the delays; false
-alarms over the level of the bounds.
+Torques and detection over time (fig. 8 of the paper), every event from its onset on, and other thresholds; false alarms
+over the level of the bounds.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu import drawing as draw
 from tendonfmu.arrays import Numbers
-from tendonfmu.detect import GRACE, ContactTuning, DetectionScore, Event, RocPoint, Scored, Track, tune_report
+from tendonfmu.detect import (
+    GRACE,
+    ContactTuning,
+    DetectionScore,
+    Event,
+    RocPoint,
+    Scored,
+    ScoreReport,
+    Track,
+    TuneReport,
+    tune_report,
+)
 from tendonfmu.files import counted
 from tendonfmu.recordings import flagged_stretches
-from tendonfmu.report.numbers import with_ends
+from tendonfmu.report.numbers import Table, with_ends
 from tendonfmu.report.page import write_figures
-from tendonfmu.statistics import intervals as statistics_intervals
 
 PAGE, TUNING_PAGE = "score.html", "tuning.html"
 SHOWN = 20.0  # s of the recording, where most events are
 JOINTS = 4  # drawn at most
 BEFORE, AFTER, LONGEST = 0.3, 0.3, 2.5  # s; an event's row before the onset, after the end, and at most after onset
-TAIL = 2.0  # times the delay of 90 %; later events are counted, not drawn
-NAMED = (0.25, 0.5, 1.0, 2.0, 4.0)  # factors written beside their points
+PRINTED = (0.5, 1.0, 2.0)  # factors on the thresholds that are printed
+TICKS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)  # factors on the thresholds
 _COLUMNS, _POINTS = 560, 5000
-_INTERVAL = "#B4BBC4"
 _HEAT = ("#FFFFFF", "#BBD9EE", draw.SKY, draw.BLUE, "#08306B")
 
 
@@ -47,8 +57,6 @@ def score_sheets(scored: Scored) -> Iterator[draw.Sheet]:
         yield event_sheet(scored)
     if scored.roc and scored.summary.events and scored.summary.free_minutes:
         yield roc_sheet(scored, scored.roc)
-    if scored.summary.found:
-        yield delay_sheet(scored)
 
 
 # --- over time --------------------------------------------------------------------------------------------------------
@@ -210,7 +218,10 @@ def event_sheet(scored: Scored) -> draw.Sheet:
         x_limits=(-BEFORE, end),
         y_limits=(count - 0.5, -0.5),
     )
-    return draw.Sheet("score", "events", f"{scored.finger.name}: {counted(count, 'event')}", [shown])
+    title = f"{scored.finger.name}: {counted(count, 'event')}, {summary.found} found"
+    late = [1e3 * summary.delay[key].value for key in ("median", "ninety_percent")]
+    caption = f"Half of those found within {late[0]:.0f} ms, 90 % within {late[1]:.0f} ms." if summary.found else ""
+    return draw.Sheet("score", "events", title, [shown], caption)
 
 
 def _order(event: Event) -> tuple[int, float]:
@@ -227,103 +238,35 @@ def _row(track: Track, at: Numbers) -> Numbers:
     return np.where(inside, size[np.maximum(index, 0)], math.nan)
 
 
-# --- ROC and delays ---------------------------------------------------------------------------------------------------
+# --- other thresholds -------------------------------------------------------------------------------------------------
 
 
 def roc_sheet(scored: Scored, points: Sequence[RocPoint]) -> draw.Sheet:
-    """Show found events against false alarms, and both over the factor on the thresholds."""
-    events, minutes = counted(scored.summary.events, "event"), scored.summary.free_minutes
+    """Show found events and alarms over the factor on the thresholds."""
     factors = np.array([point.factor for point in points])
-    found, found_low, found_high = with_ends((point.found_share for point in points), 100.0)
-    rate, rate_low, rate_high = with_ends(point.false_alarms_per_hour for point in points)
+    found, low, high = with_ends((point.found_share for point in points), 100.0)
     in_alarm = 100.0 * np.array([point.free_alarm_share for point in points])
-    own = [int(np.argmin(np.abs(np.log(factors))))]
-    named, least = _named(points), 60.0 / minutes  # one alarm in all free time, 1/h
-    against = draw.panel(
-        "Events found, over false alarms",
-        "Share of the events that are found over the rate of false alarms, at several factors on all thresholds",
-        "false alarms per hour of free time",
-        "events found (%)",
-        draw.bars(rate, found_low, found_high, "", _INTERVAL),
-        draw.bars(found, rate_low, rate_high, "", _INTERVAL, lying=True),
-        draw.curve(rate, found, "", draw.SKY, 1.5),
-        draw.dots(rate, found),
-        draw.dots(rate[named], found[named], texts=[f"×{factors[k]:g}" for k in named]),
-        draw.dots(rate[own], found[own], "the description's thresholds", draw.VERMILION),
-        size="medium",
-        height=400,
-        near_x=least,
-        x_limits=(-0.15 * least, 2.0 * max(float(rate_high.max()), least)),
-        y_limits=(-3.0, 103.0),
-    )
     masked = 100.0 * np.array([point.masked / point.events for point in points])
-    over = draw.panel(
+    shown = draw.panel(
         "Over the factor on all thresholds",
         "Share of the events that are found, and of the free time in alarm, over a factor on all thresholds",
         "factor on all thresholds",
         "share (%)",
-        draw.band(factors, found_low, found_high, "95 % interval"),
+        draw.band(factors, low, high, "95 % interval"),
         draw.curve(factors, found, "events found", draw.BLUE, 1.8),
         draw.curve(factors, in_alarm, "free time in alarm", draw.VERMILION, 1.8),
         draw.curve(factors, masked, "missed: in alarm before", draw.GREY, 1.4, "dash"),
         draw.dots(factors, found),
         draw.dots(factors, in_alarm, "", draw.VERMILION),
         draw.mark(1.0),
-        size="medium",
+        size="wide",
         height=400,
-        x_ticks=[(factor, f"{factor:g}") for factor in (*NAMED, 8.0) if factors.min() <= factor <= factors.max()],
+        x_ticks=[(factor, f"{factor:g}") for factor in TICKS if factors.min() <= factor <= factors.max()],
         log_x=True,
         y_limits=(-3.0, 103.0),
     )
-    title = f"{scored.finger.name}: {events}, {minutes:.3g} min of free time"
-    return draw.Sheet("score", "roc", title, [against, over])
-
-
-def _named(points: Sequence[RocPoint]) -> list[int]:
-    """Choose the points of `NAMED` factors, one of those in the same place."""
-    places: dict[tuple[int, int], int] = {}
-    for k, point in enumerate(points):
-        if any(math.isclose(point.factor, factor) for factor in NAMED):
-            places[(point.found, point.false_alarms)] = k
-    return list(places.values())
-
-
-def delay_sheet(scored: Scored) -> draw.Sheet:
-    """Show the share of all events found within a time, with its interval."""
-    delays = np.sort([event.delay for score in scored.scores for event in score.events if event.found])
-    total, delay = scored.summary.events, scored.summary.delay
-    median, ninety = delay["median"].value, delay["ninety_percent"].value
-    end = float(delays[-1])
-    if end > TAIL * ninety > 0:
-        end = TAIL * ninety
-    later, ms = int((delays > end).sum()), 1e3 * delays
-    share, low, high = with_ends((statistics_intervals.share(k, total) for k in range(1, len(delays) + 1)), 100.0)
-    top = min(100.0, 1.3 * float(high.max()))
-    marks = ((median, f"median {1e3 * median:.0f} ms", ""), (ninety, f"90 % within {1e3 * ninety:.0f} ms", "dash"))
-    shown = draw.panel(
-        "Found so far",
-        f"Share of all events found within a time: half within {1e3 * median:.0f} ms",
-        "delay from the onset (ms)",
-        "share of events (%)",
-        draw.band(np.repeat(ms, 2)[1:], np.repeat(low, 2)[:-1], np.repeat(high, 2)[:-1], "95 % interval"),
-        draw.curve(*_stairs(ms, share), "found so far", draw.BLUE, 1.8),
-        *(
-            draw.curve(np.full(2, 1e3 * at), np.array([0.0, top]), name, draw.VERMILION, 1.3, dash)
-            for at, name, dash in marks
-        ),
-        note=f"{later} later, up to {ms[-1]:.0f} ms →" if later else "",
-        size="wide",
-        height=330,
-        x_limits=(0.0, 1.03e3 * max(end, 1e-3)),
-        y_limits=(0.0, top),
-    )
-    title = f"{scored.finger.name}: {len(delays)} of {counted(total, 'event')} found"
-    return draw.Sheet("score", "delays", title, [shown])
-
-
-def _stairs(x: Numbers, y: Numbers) -> tuple[Numbers, Numbers]:
-    """Return the line that rises to y at each x, from 0 on."""
-    return np.concatenate([[0.0], np.repeat(x, 2)]), np.concatenate([[0.0], [0.0], np.repeat(y, 2)[:-1]])
+    events, minutes = counted(scored.summary.events, "event"), scored.summary.free_minutes
+    return draw.Sheet("score", "roc", f"{scored.finger.name}: {events}, {minutes:.3g} min of free time", [shown])
 
 
 # --- tuning -----------------------------------------------------------------------------------------------------------
@@ -365,3 +308,155 @@ def tail_sheet(tuning: ContactTuning) -> draw.Sheet:
     )
     title = f"{report['finger']}: {report['minutes']:.0f} min of free motion, {report['method']}"
     return draw.Sheet("tune", "tail", title, [shown])
+
+
+# --- a score in words -------------------------------------------------------------------------------------------------
+
+
+def score_tables(report: ScoreReport) -> Iterator[Table]:
+    """List the tables to print: torque by joint, with 95 % intervals in brackets."""
+    columns: list[tuple[str, float, list[Any] | None]]
+    columns = [("free residual\nrms, mN·m", 1e3, _with_intervals(report, "free_rms"))]
+    if report["contact_torque_rms_error"] is not None:
+        columns += [
+            ("in contact: error\nrms, mN·m", 1e3, _with_intervals(report, "contact_torque_rms_error")),
+            ("correlation", 1.0, report["contact_torque_correlation"]),
+            ("slope", 1.0, report["contact_torque_slope"]),
+            ("within\n2 std, %", 100.0, report["contact_torque_within_two_std"]),
+        ]
+    columns.append(("at the alarm: median\n|external|, mN·m", 1e3, report["at_alarm"]["external_torque"]))
+    shown = [(heading, [_estimate(each, factor) for each in values]) for heading, factor, values in columns if values]
+    yield (
+        f"{report['finger']}: torque, with 95 % intervals",
+        ("joint", *(heading for heading, _ in shown)),
+        list(zip(report["joints"], *(cells for _, cells in shown), strict=True)),
+    )
+
+
+def _with_intervals(report: Mapping[str, Any], key: str) -> list[Any]:
+    pairs = zip(report[key], report[f"{key}_interval"], strict=True)
+    return [{"value": value, "interval": interval} for value, interval in pairs]
+
+
+def score_lines(report: ScoreReport) -> Iterator[str]:
+    """List the lines to print: false alarms, events, delays, other thresholds."""
+    if report["events"]:
+        yield from _event_lines(report)
+    after, minutes = report["false_alarms_after_events"], report["free_minutes"]
+    soon = f" ({after} of them within 2 s after an event)" if after else ""
+    yield (
+        f"false alarms: {report['false_alarms']}{soon} in {minutes:.3g} min of free time, "
+        f"{_estimate(report['false_alarms_per_minute'])} per minute; "
+        f"in alarm {_estimate(report['free_alarm_share'], 100.0)} % of the free time"
+    )
+    points = report["roc"]["points"] or []
+    shown = [point for point in points if any(math.isclose(point["factor"], factor) for factor in PRINTED)]
+    if shown and minutes:
+        factors = ", ".join(f"{point['factor']:g}" for point in shown)
+        some = ", ".join(f"{point['found']}" for point in shown)
+        rates = (point["false_alarms_per_hour"]["value"] or 0.0 for point in shown)
+        per_hour = ", ".join(f"{rate:.0f}" if rate >= 100 else f"{rate:.3g}" for rate in rates)
+        hit = f"{some} of {report['events']} found; " if report["events"] else ""
+        yield f"thresholds × {factors}: {hit}{per_hour} false alarms per hour"
+    if report["roc"]["absent"]:
+        yield f"no ROC: {report['roc']['absent']}"
+
+
+def _event_lines(report: ScoreReport) -> Iterator[str]:
+    found, masked, released = report["found"], report["missed_in_alarm"], report["found_at_release"]
+    why = f", {masked} of them in an alarm that had begun before" if masked else ""
+    late = f", {released} of them only as the load ends" if released else ""
+    share = _estimate(report["found_share"], 100.0)
+    yield f"events: {found} of {report['events']} found{late}, {share} %; {report['missed']} missed{why}"
+    if not found:
+        return
+    delay, over, force = report["delay_s"], report["overhang"], report["at_alarm"]["force"]
+    lower, upper, ninety = (
+        _number(delay[key]["value"], 1e3) for key in ("lower_quartile", "upper_quartile", "ninety_percent")
+    )
+    yield f"delay: median {_estimate(delay['median'], 1e3)} ms, quartiles {lower} and {upper}, 90 % within {ninety}"
+    felt = "" if force is None else f"; force at the alarm: median {_estimate(force)} N"
+    yield (
+        f"held to their end: {report['held']} of {found}; alarms that outlast an event: {over['events']}, "
+        f"{over['seconds']:.3g} s in all, the longest {over['longest_s']:.3g} s{felt}"
+    )
+
+
+def _estimate(estimate: Any, factor: float = 1.0) -> str:
+    """Format an estimate of a report with its interval, such as `12 (8.1 to 19)`."""
+    value, interval = _number(estimate["value"], factor), estimate["interval"]
+    if interval is None:
+        return value
+    return f"{value} ({_number(interval[0], factor)} to {_number(interval[1], factor)})"
+
+
+def _number(value: float | None, factor: float) -> str:
+    """Format with three digits, and at most two decimals where that is enough."""
+    if value is None or math.isnan(value):
+        return "-"
+    scaled = factor * value
+    if abs(scaled) >= 99.95:
+        return f"{scaled:.0f}"
+    return f"{scaled:.1f}" if abs(scaled) >= 9.995 else f"{scaled:.2f}"
+
+
+# --- a tuning in words ------------------------------------------------------------------------------------------------
+
+
+def tune_tables(report: TuneReport) -> Iterator[Table]:
+    """List the tables to print: what is found, by joint, then results by pretension."""
+    pushes, contact = report["pushes"], report["contact"]
+    deviation = (contact["deviation"], contact["deviation_per_force"])
+    by_joint = zip(report["joints"], pushes["torque"], *deviation, strict=True)
+    yield (
+        f"{report['finger']}: {report['method']}",
+        (
+            "joint",
+            f"found within {1e3 * pushes['within_s']:.0f} ms,\n9 of 10: from mN·m",
+            "deviation\nmN·m",
+            "+ per N\nmN·m/N",
+        ),
+        [(joint, *("–" if value is None else f"{1e3 * value:.3g}" for value in each)) for joint, *each in by_joint],
+    )
+    yield (
+        "free motion",
+        ("mean force, N", "minutes", "residual rms\nmN·m"),
+        [
+            (
+                f"{each['mean_force']:.3g}",
+                f"{each['minutes']:.1f}",
+                ", ".join(f"{1e3 * value:.2g}" for value in each["free_rms"]),
+            )
+            for each in report["pretensions"]
+        ],
+    )
+
+
+def tune_lines(report: TuneReport) -> Iterator[str]:
+    """List the lines to print: what was asked for and found, and the noise of bias and sensors."""
+    yield report["sentence"]
+    kept_out, bias, sensors = report["kept_out"], report["bias"], report["sensor_fault"]
+    low, high = kept_out["interval"]
+    if kept_out["alarms"]:
+        where = ", ".join(f"{each['alarms']} in {each['path']}" for each in kept_out["recordings"] if each["alarms"])
+        yield (
+            f"kept out: {where}; the longest {kept_out['longest_s']:.3g} s, "
+            f"{100 * kept_out['share_in_alarm']:.2g} % of the time in alarm"
+        )
+    yield f"with 95 % confidence between {low:.3g} and {high:.3g} false alarms an hour"
+    forces = report["holds_for"]
+    yield (
+        f"learned at mean tendon forces of {forces['lowest_force']:.3g} to {forces['highest_force']:.3g} N; beyond "
+        "them bounds are extrapolated"
+    )
+    yield (
+        f"bias: noise {1e3 * bias['noise_std']:.3g} mN·m + {1e3 * bias['noise_std_per_force']:.3g} mN·m per N, "
+        f"time constant {bias['time_constant']:.3g} s at {bias['mean_force']:.3g} N"
+    )
+    if sensors["keys"] is None:
+        yield f"sensor faults are not watched: {sensors['left_out']}"
+    else:
+        yield (
+            f"sensor faults: forces differ from those of their springs by up to {sensors['largest_difference']:.2g} N "
+            f"in free motion, {sensors['keys']['spring_margin']:.3g} N are allowed"
+        )
