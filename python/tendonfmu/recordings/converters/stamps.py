@@ -22,18 +22,10 @@ from tendonfmu.recordings.converters.units import STAMPS
 NANOSECONDS = 10**9
 LATEST = 2**62  # ns; the year 2116
 DAY = 86400 * NANOSECONDS
-DATES: tuple[str, ...] = (
-    "%Y-%m-%d",
-    "%Y/%m/%d",
-    "%Y.%m.%d",
-    "%d.%m.%Y",
-    "%d/%m/%Y",
-    "%m/%d/%Y",
-    "%d-%m-%Y",
-    "%m-%d-%Y",
-    "%d.%m.%y",
+DATES = (
+    *("%Y-%m-%d", "%Y/%m/%d", "%Y.%m.%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y", "%m-%d-%Y", "%d.%m.%y"),
+    *("%d/%m/%y", "%m/%d/%y", "%d-%b-%Y", "%d %b %Y", "%b %d, %Y", "%Y%m%d", "0 days"),
 )
-DATES += ("%d/%m/%y", "%m/%d/%y", "%d-%b-%Y", "%d %b %Y", "%b %d, %Y", "%Y%m%d", "0 days")
 PATTERNS = [
     f"{date}{hour}"
     for date in ("", *(f"{date} " for date in DATES), *(f"{date}T" for date in DATES))
