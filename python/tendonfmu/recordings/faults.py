@@ -74,14 +74,12 @@ def gaps(time: Numbers) -> list[int]:
 
 
 def gap_sentences(recording: Recording) -> Iterator[str]:
-    """Describe the gaps, at most three of them each."""
-    starts = gaps(recording.time)
-    for k in starts[:3]:
-        before, after = recording.time[k - 1], recording.time[k]
-        jump = f"time jumps by {after - before:.4g} s after row {k} ({before:.6g} s)"
-        yield f"{jump}: a gap or a jump of the clock; the parts before and after it are fitted separately"
-    if len(starts) > 3:
-        yield f"{counted(len(starts) - 3, 'more gap')}; every part is fitted as a separate recording"
+    """Describe the gaps."""
+    if starts := gaps(recording.time):
+        before, after = recording.time[starts[0] - 1 : starts[0] + 1]
+        jump = f"time jumps by {after - before:.4g} s after row {starts[0]} ({before:.6g} s)"
+        more = f", and {len(starts) - 1} times more" if len(starts) > 1 else ""
+        yield f"{jump}{more}: a gap or a jump of the clock; the parts before and after it are fitted separately"
 
 
 def rate_sentences(recording: Recording, finger: Finger) -> Iterator[str]:
@@ -94,14 +92,9 @@ def rate_sentences(recording: Recording, finger: Finger) -> Iterator[str]:
         yield f"{poor}; expected at least {SLOW_RATE:g}, better 500"
     if rate > FAST_RATE:
         per_sample = (finger.data.get("bias") or {}).get("noise_time") is None
-        noise = (
-            "; without bias.noise_time the noise counts per sample, so standard errors are too small unless the "
-            "sensors' noise is white up to this rate"
-        )
-        yield (
-            f"{rate:.5g} samples per second take {rate / 1000:.2g} times as long as 1000 and give no better result"
-            f"{noise if per_sample else ''}; expected at most {FAST_RATE:g}, by decimating after a low-pass filter"
-        )
+        noise = "; without bias.noise_time the noise counts per sample, and standard errors may be too small"
+        more = f"{rate:.5g} samples per second give no better result than 1000{noise if per_sample else ''}"
+        yield f"{more}; expected at most {FAST_RATE:g}, by decimating after a low-pass filter"
 
 
 def silent_tendons(recording: Recording, finger: Finger) -> Iterator[str]:

@@ -78,7 +78,7 @@ _TEXTS = {
     "rests": (
         "warning",
         "{share} at rest",
-        "a motor that holds with any torque up to friction",
+        "a motor that holds by friction",
         "fit and diagnose learn from motion alone",
     ),
     "clock": ("error", "{samples} {step:.4g} s apart, {rate:.4g} per second", "time in {unit}", "{set}"),
@@ -108,8 +108,7 @@ _TEXTS = {
     ),
     "held": (
         "warning",
-        "holds {value:.6g} in {percent} of the samples, first from {first:.4g} to {last:.4g} s, while other channels "
-        "change",
+        "holds {value:.6g} in {percent} of the samples, first from {first:.4g} to {last:.4g} s, while others change",
         "a stuck sensor, or a cable that is not plugged in",
         "replace the sensor's log, or cut these times out",
     ),

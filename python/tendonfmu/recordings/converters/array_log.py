@@ -11,7 +11,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -50,8 +50,9 @@ class Array:
     def of(cls, topic: str, name: str, values: Any, by_columns: bool, unit: str = "") -> Array:
         """Return the array of an array or dataset. by_columns: the columns of a matrix are the rows."""
         shape = (values.shape[1], values.shape[0]) if by_columns else values.shape
-        read = partial(_read_columns if by_columns else _read_rows, values)
-        return cls(topic, name, shape, values.dtype, read, unit)
+        if by_columns:
+            return cls(topic, name, shape, values.dtype, lambda start, stop: np.asarray(values[:, start:stop]).T, unit)
+        return cls(topic, name, shape, values.dtype, lambda start, stop: values[start:stop], unit)
 
     def fields(self) -> Iterator[tuple[Field, int]]:
         """Yield the fields, each with the column that it is."""
@@ -66,12 +67,9 @@ class Array:
             yield Field(self.name, OTHER, f"{self.dtype} {sizes}", self.unit), 0
 
 
-def _read_rows(values: Any, start: int, stop: int) -> Any:
-    return values[start:stop]
-
-
-def _read_columns(values: Any, start: int, stop: int) -> Any:
-    return np.asarray(values[:, start:stop]).T
+def _rows_of(values: Any, part: Callable[[Any], Any]) -> Callable[[int, int], Any]:
+    """Return a function that reads rows (start, stop) of an array, and of these a part."""
+    return lambda start, stop: part(values[start:stop])
 
 
 class ArraysLog:
@@ -208,7 +206,14 @@ def _arrays(name: str, dataset: Any) -> Iterator[Array]:
     for part in dataset.dtype.names:
         inner = dataset.dtype[part]
         shape = (*dataset.shape, *inner.shape)
-        yield Array(f"{name}.", f"{name}.{part}", shape, inner.base, partial(_read_part, dataset, part), unit)
+        yield Array(
+            f"{name}.",
+            f"{name}.{part}",
+            shape,
+            inner.base,
+            _rows_of(dataset, itemgetter(part)),
+            unit,
+        )
 
 
 def _of_pandas(group: str, node: Any) -> Iterator[Array]:
@@ -219,15 +224,13 @@ def _of_pandas(group: str, node: Any) -> Iterator[Array]:
         for k, label in enumerate(node[f"{block}_items"][()]):
             name = label.decode("utf-8", "replace") if isinstance(label, bytes) else str(label)
             values = node[f"{block}_values"]
-            yield Array(group, f"{group}{name}", values.shape[:1], values.dtype, partial(_read_column, values, k))
-
-
-def _read_column(values: Any, column: int, start: int, stop: int) -> Any:
-    return values[start:stop, column]
-
-
-def _read_part(dataset: Any, part: str, start: int, stop: int) -> Any:
-    return dataset[start:stop][part]
+            yield Array(
+                group,
+                f"{group}{name}",
+                values.shape[:1],
+                values.dtype,
+                _rows_of(values, itemgetter((slice(None), k))),
+            )
 
 
 def _unit(dataset: Any) -> str:

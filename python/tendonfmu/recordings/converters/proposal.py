@@ -303,35 +303,21 @@ def inspection_document(inspection: Inspection, proposal: Proposal) -> dict[str,
 
 def _topic(topic: TopicSummary, factor: float | None) -> dict[str, Any]:
     fields = [
-        {
-            "name": summary.field.name,
-            "type": summary.field.type,
-            "unit": summary.field.unit,
-            "count": summary.count,
-            "missing": summary.missing,
-            "range": [summary.low, summary.high] if summary.low <= summary.high else None,
-            "example": summary.example or None,
-        }
+        {key: getattr(summary.field, key) for key in ("name", "type", "unit")}
+        | {"count": summary.count, "missing": summary.missing}
+        | {"range": [summary.low, summary.high] if summary.low <= summary.high else None}
+        | {"example": summary.example or None}
         for summary in topic.fields
     ]
-    clock = None if topic.clock is None else _clock(topic.clock, factor)
-    return {"name": topic.topic.name, "clock": clock, "fields": fields}
+    return {"name": topic.topic.name, "clock": topic.clock and _clock(topic.clock, factor), "fields": fields}
 
 
 def _clock(clock: ClockSummary, factor: float | None) -> dict[str, Any]:
-    step = clock.seconds(clock.step, factor)
-    return {
-        "field": clock.name,
-        "rows": clock.rows,
-        "first": clock.first,
-        "last": clock.last,
-        "rate": 1.0 / step if step else None,
-        "duration": clock.seconds(clock.last - clock.first, factor),
-        "largest_step": clock.seconds(clock.largest, factor),
-        "gaps": clock.gaps,
-        "repeated": clock.repeated,
-        "backwards": clock.backwards,
-    }
+    spans = {"step": clock.step, "duration": clock.last - clock.first, "largest_step": clock.largest}
+    seconds = {key: clock.seconds(span, factor) for key, span in spans.items()}
+    step = seconds.pop("step")
+    counts = {key: getattr(clock, key) for key in ("rows", "first", "last", "gaps", "repeated", "backwards")}
+    return {"field": clock.name, "rate": 1.0 / step if step else None, **seconds, **counts}
 
 
 def field_rows(topic: TopicSummary) -> Iterator[list[str]]:
