@@ -18,8 +18,9 @@ from optional_parts import DATA, needs
 from tendonfmu.errors import InputError
 from tendonfmu.files.tables import write_table
 from tendonfmu.recordings.converters import CONVERTERS, convert_file, converter
-from tendonfmu.recordings.converters.davinci import convert as convert_tool
-from tendonfmu.recordings.converters.emps import EDGE, MASS, convert
+from tendonfmu.recordings.converters.machines import EDGE, MASS
+from tendonfmu.recordings.converters.machines import convert_davinci as convert_tool
+from tendonfmu.recordings.converters.machines import convert_emps as convert
 from tendonfmu.recordings.recording import read_recording
 
 

@@ -14,7 +14,7 @@ from tendonfmu.errors import InputError
 from tendonfmu.recordings.converters.inspection import inspect_log
 from tendonfmu.recordings.converters.proposal import propose
 from tendonfmu.recordings.converters.table import convert_table
-from tendonfmu.recordings.counters import overflow, unwrapped, wrap_of
+from tendonfmu.recordings.traps import overflow, unwrapped, wrap_of
 
 T = np.arange(2000) / 500.0
 MOTION = 2.3 * np.sin(1.7 * T) + 0.6 * np.sin(5.0 * T)  # turns

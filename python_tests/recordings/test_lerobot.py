@@ -15,7 +15,6 @@ from command import Answer, Call
 from map_cases import VALIDATOR
 from repository_paths import ROOT
 from tendonfmu.files.tables import read_table
-from tendonfmu.recordings.converters import lerobot_log
 from tendonfmu.recordings.converters.lerobot_log import LeRobotLog
 
 OFFICIAL = ROOT / "python_tests" / "recordings" / "lerobot_datasets"
@@ -166,7 +165,6 @@ def small(folder: Path, version: str, **more: Any) -> Path:
 def test_names_with_indices_and_episodes_of_one_row_group(
     call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, version: str
 ) -> None:
-    monkeypatch.setattr(lerobot_log, "ROWS", 3)
     small(tmp_path, version, fps=10)
     answer = call("convert", "lerobot", "set", "--map", "map.json", "-o", "out", "--episodes", "3-4, 1,1")
     assert answer.status == 0, answer.err

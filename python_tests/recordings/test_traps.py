@@ -15,9 +15,8 @@ from tendonfmu.arrays import Numbers
 from tendonfmu.model import Finding, Finger, finger_from_data, read_finger
 from tendonfmu.recordings import Recording, belongs, read_recording
 from tendonfmu.recordings.converters.table import convert_table
-from tendonfmu.recordings.counters import wrap_of
 from tendonfmu.recordings.routing import learn_routing
-from tendonfmu.recordings.traps import find_traps, is_magnitude
+from tendonfmu.recordings.traps import find_traps, is_magnitude, wrap_of
 
 INDEX = ROOT / "examples" / "fingers" / "index_finger.json"
 DEMO = ROOT / "examples" / "demo_recording"
@@ -91,7 +90,8 @@ def test_a_burst_at_the_end_is_no_unit() -> None:
     force[-100:-93, 0] = 14.0
     force[-4000:, 0] *= 4.448222
     (trap,) = find_traps(read_finger(DEMO / "two_joints.json"), recording)
-    assert (trap.kind, trap.what) == ("switched", "lbf") and trap.at == pytest.approx(41.6, abs=2.4)
+    assert (trap.kind, trap.numbers["unit"]) == ("switched", "lbf")
+    assert trap.numbers["at"] == pytest.approx(41.6, abs=2.4)
 
 
 def test_a_slow_encoder_of_14_bits_repeats_its_values(sound: tuple[Finger, Recording]) -> None:

@@ -131,13 +131,10 @@ def _chain(model: CompiledModel, names: Sequence[str]) -> list[Joint]:
         if _carries(model, before, after):
             continue
         if _carries(model, after, before):
-            raise InputError(
-                f"{model.path}: joint {after.name}: carries joint {before.name}, which is given before it; "
-                "expected the joints base first"
-            )
-        raise InputError(
-            f"{model.path}: joint {after.name}: not carried by joint {before.name}; expected one chain of joints"
-        )
+            what = f"joint {after.name}: carries joint {before.name}, which is given before it"
+            raise InputError(f"{model.path}: {what}; expected the joints base first")
+        what = f"joint {after.name}: not carried by joint {before.name}"
+        raise InputError(f"{model.path}: {what}; expected one chain of joints")
     return joints
 
 
@@ -146,10 +143,8 @@ def _only_chain(model: CompiledModel) -> list[str]:
     joints = [joint for joint in model.joints if joint.kind in ("hinge", "slide") and joint.name]
     driven = [tendon for tendon in model.tendons if is_driven(model, tendon)]
     if not driven:
-        raise InputError(
-            f"{model.path}: {counted(len(model.tendons), 'tendon')}, none with an actuator or a motor on a slide; "
-            "expected tendons that pull, or passive ones named by --tendons, with --joints"
-        )
+        none = f"{counted(len(model.tendons), 'tendon')}, none with an actuator or a motor on a slide"
+        raise InputError(f"{model.path}: {none}; expected tendons that pull, or --tendons and --joints")
     motors = {joint.index for tendon in driven for joint in motors_of(model, tendon)}
     joints = [joint for joint in joints if joint.index not in motors]
     angles = np.random.default_rng(0).uniform(-0.3, 0.3, (8, len(joints)))
@@ -159,9 +154,8 @@ def _only_chain(model: CompiledModel) -> list[str]:
     chains = [[joint.name for joint in joints if joint == end or _carries(model, joint, end)] for end in ends]
     if len(chains) != 1:
         listed = "; ".join(",".join(chain) for chain in chains) or "none that a driven tendon moves"
-        raise InputError(
-            f"{model.path}: {counted(len(chains), 'chain')} of joints: {listed}; expected --joints with one"
-        )
+        there = f"{counted(len(chains), 'chain')} of joints: {listed}"
+        raise InputError(f"{model.path}: {there}; expected --joints with one")
     return chains[0]
 
 
@@ -219,10 +213,8 @@ def links_inertia(model: CompiledModel, joints: Sequence[Joint]) -> Numbers:
 def _check_moved(model: CompiledModel, joints: Sequence[Joint], arms: Sequence[Sequence[MomentArm]]) -> None:
     for j, joint in enumerate(joints):
         if all(row[j].arm == 0.0 for row in arms):
-            raise InputError(
-                f"{model.path}: joint {joint.name}: moved by none of the tendons; "
-                "expected more tendons (--tendons, springs too), or to leave the joint out"
-            )
+            expected = "more tendons (--tendons, springs too), or to leave the joint out"
+            raise InputError(f"{model.path}: joint {joint.name}: moved by none of the tendons; expected {expected}")
 
 
 def _tendon(
@@ -258,10 +250,8 @@ def _arm_warnings(
     for tendon, row in zip(tendons, arms, strict=True):
         largest = max(abs(arm.arm) for arm in row)
         if not tendon.is_spatial and largest > LONGEST_ARM:
-            yield (
-                f"tendon {tendon.name}: a fixed tendon with coefficients up to {largest:g}, which count as moment arms "
-                "in m; expected lengths, or forces that are torques"
-            )
+            what = f"a fixed tendon with coefficients up to {largest:g}, which count as moment arms in m"
+            yield f"tendon {tendon.name}: {what}; expected lengths, or forces that are torques"
         for joint, arm, (low, high) in zip(joints, row, ranges, strict=True):
             if arm.varies <= tolerance:
                 continue
@@ -291,16 +281,10 @@ def _sources(
         yield from (f"tendon {tendon.name}: {drive}" for drive in drives_of(model, tendon))
     damped = [joint.name for joint in joints if joint.damping and not joint.frictionloss]
     if damped:
-        yield (
-            f"joint {', '.join(damped)}: damping without frictionloss, so coulomb is 0; `fit` needs a value above 0 to "
-            "begin with"
-        )
+        yield f"joint {', '.join(damped)}: damping without frictionloss, so coulomb is 0; `fit` needs a value above 0"
     bare = [joint.name for joint in joints if not joint.frictionloss and not joint.damping]
     if bare:
-        yield (
-            f"joint {', '.join(bare)}: neither frictionloss nor damping in the model, so no friction in the "
-            "description; add a law where you expect friction"
-        )
+        yield f"joint {', '.join(bare)}: neither frictionloss nor damping, so no friction in the description"
 
 
 # --- the whole --------------------------------------------------------------------------------------------------------
@@ -348,8 +332,7 @@ def left_out(
     rows = [
         *_of_joints(model, joints, angles),
         *_of_tendons(model, joints, tendons, angles),
-        *_other_drives(model, joints, tendons),
-        *_constraints(model, joints, tendons),
+        *_beside_tendons(model, joints, tendons),
     ]
     if not has_gravity:
         rows += _weight_left_out(model, joints, angles)
@@ -398,16 +381,13 @@ def _of_tendons(
             yield f"tendon {tendon.name or tendon.index + 1}: {why}"
 
 
-def _other_drives(model: CompiledModel, joints: Sequence[Joint], tendons: Sequence[Tendon]) -> Iterator[str]:
-    for actuator in model.actuators:
-        for joint in joints:
-            if actuator.joint == joint.index:
-                yield f"actuator {actuator.name}: drives joint {joint.name} without a tendon"
-
-
-def _constraints(model: CompiledModel, joints: Sequence[Joint], tendons: Sequence[Tendon]) -> Iterator[str]:
+def _beside_tendons(model: CompiledModel, joints: Sequence[Joint], tendons: Sequence[Tendon]) -> Iterator[str]:
+    """Yield drives of joints, and constraints of joints or tendons."""
     of_finger = {"joint": {joint.index for joint in joints}, "tendon": {tendon.index for tendon in tendons}}
     names = {"joint": [joint.name for joint in model.joints], "tendon": [tendon.name for tendon in model.tendons]}
+    for actuator in model.actuators:
+        if actuator.joint in of_finger["joint"]:
+            yield f"actuator {actuator.name}: drives joint {names['joint'][actuator.joint]} without a tendon"
     for name, kind, ends in model.equalities():
         if of_finger[kind] & set(ends):
             yield f"constraint {name}: couples {kind} {' and '.join(names[kind][end] for end in ends)}"

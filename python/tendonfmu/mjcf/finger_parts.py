@@ -184,19 +184,15 @@ def choose_tendons(
         if chosen:
             return chosen
         others = ", ".join(tendon.name for tendon in model.tendons if moves[tendon.index]) or "none"
-        raise InputError(
-            f"{model.path}: no tendon with an actuator or a motor on a slide moves the joints "
-            f"{', '.join(joint.name for joint in joints)}; expected --tendons with some of: {others}"
-        )
+        none = f"no tendon with a drive moves the joints {', '.join(joint.name for joint in joints)}"
+        raise InputError(f"{model.path}: {none}; expected --tendons with some of: {others}")
     chosen = [model.tendon_named(name) for name in names]
     for tendon in chosen:
         if list(names).count(tendon.name) > 1:
             raise InputError(f"{model.path}: tendon {tendon.name}: given twice; expected once")
         if not moves[tendon.index]:
-            raise InputError(
-                f"{model.path}: tendon {tendon.name}: moves none of the joints "
-                f"{', '.join(joint.name for joint in joints)}; expected one that does, or to leave it out"
-            )
+            what = f"moves none of the joints {', '.join(joint.name for joint in joints)}"
+            raise InputError(f"{model.path}: tendon {tendon.name}: {what}; expected one that does")
     return chosen
 
 

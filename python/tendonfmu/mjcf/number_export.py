@@ -162,9 +162,8 @@ def _write(path: Path, changes: Sequence[Change], file: Path, output: Path) -> N
     text = source.text()
     beside = source.first_file()
     if beside is not None and output.resolve().parent != path.resolve().parent:
-        raise InputError(
-            f"{output}: the model refers to {beside} beside it; expected an output in the folder of {path.name}"
-        )
+        expected = f"an output in the folder of {path.name}"
+        raise InputError(f"{output}: the model refers to {beside} beside it; expected {expected}")
     file.write_bytes(text)
     _check_written(file, changes)
 

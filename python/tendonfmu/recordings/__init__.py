@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from .converters.table import Conversion, convert_table
     from .entry_types import Nis, RecordingEntry, RoutingEntry, Whiteness
     from .faults import gaps, tendon_angles
+    from .findings import check_report, recording_report, refusal_report, routing_entry, varying_sentences
     from .match import UNFIT_FOR_SEARCH, admit, belongs
-    from .match_text import check_report, recording_report, refusal_report, routing_entry, varying_sentences
     from .prepared import (
         FitRecording,
         Grid,

@@ -37,9 +37,7 @@ def read_columns(file: Path, names: Sequence[str], known: Collection[str]) -> li
     """Return the columns of a table that a recording has."""
     for separator in ";\t":
         if len(names) == 1 and separator in names[0]:
-            raise InputError(
-                f"{file}: columns separated by {separator!r}; expected commas, and points in numbers; {_OTHER_TABLES}"
-            )
+            raise InputError(f"{file}: columns separated by {separator!r}; expected commas; {_OTHER_TABLES}")
     ours = [name for name in names if name == "time" or name in known or (element_of(name) or ("",))[0] in GROUPS]
     ignored = [name for name in names if name not in ours]
     for name in ignored:
@@ -93,6 +91,5 @@ def check_sizes(file: Path, sizes: Mapping[str, int]) -> None:
     for name, size in sizes.items():
         other = first.setdefault(GROUP_PER[name], name)
         if size != sizes[other]:
-            raise InputError(
-                f"{file}: {counted(size, 'column')} {name}[...], expected {sizes[other]} as of {other}[...]"
-            )
+            given = f"{counted(size, 'column')} {name}[...]"
+            raise InputError(f"{file}: {given}, expected {sizes[other]} as of {other}[...]")

@@ -6,14 +6,15 @@ This module does not use a friction model. The values that a channel is compared
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from tendonfmu.arrays import Numbers
-from tendonfmu.files import counted
+from tendonfmu.files import are, counted, percent
 from tendonfmu.model import Finger
-from tendonfmu.recordings.recording import Recording
+from tendonfmu.recordings.recording import GROUPS, Recording
 from tendonfmu.recordings.tendon_springs import with_linear_springs
 
 Runs = list[tuple[int, int]]  # (begin, end) of samples, end excluded
@@ -74,16 +75,12 @@ def gaps(time: Numbers) -> list[int]:
 
 
 def gap_sentences(recording: Recording) -> Iterator[str]:
-    """Describe the gaps, at most three of them each."""
-    starts = gaps(recording.time)
-    for k in starts[:3]:
-        before, after = recording.time[k - 1], recording.time[k]
-        yield (
-            f"time jumps by {after - before:.4g} s after row {k} ({before:.6g} s): a gap or a jump of the clock; "
-            "the parts before and after it are fitted as separate recordings"
-        )
-    if len(starts) > 3:
-        yield f"{counted(len(starts) - 3, 'more gap')}; every part is fitted as a separate recording"
+    """Describe the gaps."""
+    if starts := gaps(recording.time):
+        before, after = recording.time[starts[0] - 1 : starts[0] + 1]
+        jump = f"time jumps by {after - before:.4g} s after row {starts[0]} ({before:.6g} s)"
+        more = f", and {len(starts) - 1} times more" if len(starts) > 1 else ""
+        yield f"{jump}{more}: a gap or a jump of the clock; the parts before and after it are fitted separately"
 
 
 def rate_sentences(recording: Recording, finger: Finger) -> Iterator[str]:
@@ -92,29 +89,20 @@ def rate_sentences(recording: Recording, finger: Finger) -> Iterator[str]:
         return
     rate = 1 / float(np.median(np.diff(recording.time)))
     if rate < SLOW_RATE:
-        yield (
-            f"reversals, sticking and the velocity filter are poorly resolved at {rate:.3g} samples per second, and "
-            f"so are static friction and Stribeck velocities; expected at least {SLOW_RATE:g}, better 500"
-        )
+        poor = f"reversals, sticking and static friction are poorly resolved at {rate:.3g} samples per second"
+        yield f"{poor}; expected at least {SLOW_RATE:g}, better 500"
     if rate > FAST_RATE:
         per_sample = (finger.data.get("bias") or {}).get("noise_time") is None
-        noise = (
-            "; without bias.noise_time the noise counts per sample, so standard errors are too small unless the "
-            "sensors' noise is white up to this rate"
-        )
-        yield (
-            f"{rate:.5g} samples per second take {rate / 1000:.2g} times as long as 1000 and give no better result"
-            f"{noise if per_sample else ''}; expected at most {FAST_RATE:g}, by decimating after a low-pass filter"
-        )
+        noise = "; without bias.noise_time the noise counts per sample, and standard errors may be too small"
+        more = f"{rate:.5g} samples per second give no better result than 1000{noise if per_sample else ''}"
+        yield f"{more}; expected at most {FAST_RATE:g}, by decimating after a low-pass filter"
 
 
 def silent_tendons(recording: Recording, finger: Finger) -> Iterator[str]:
     """Describe tendons whose force is zero throughout."""
     for i in np.flatnonzero(~recording.groups["tendon_force"].any(axis=0)):
-        yield (
-            f"tendon_force[{i + 1}] ({finger.tendon_names[i]}) is 0 throughout: a tendon without tension or a sensor "
-            "without signal; its friction cannot be estimated and keeps the given numbers"
-        )
+        silent = f"tendon_force[{i + 1}] ({finger.tendon_names[i]}) is 0 throughout"
+        yield f"{silent}: no tension or no signal; its friction cannot be estimated and keeps the given numbers"
 
 
 # --- stuck sensors ----------------------------------------------------------------------------------------------------
@@ -238,73 +226,46 @@ def _stuck_force(force: Numbers, i: int, runs: Runs) -> Iterator[StuckSensor]:
 
 
 @dataclass(frozen=True)
-class Clock:
-    """The time steps of a recording."""
+class Fault:
+    """Something wrong with columns, which they show by themselves."""
 
-    step: float  # median step (s)
-    # factor to seconds and name of the unit in which the times seem to be given, or None
-    unit: tuple[float, str] | None
-    senseless: bool  # whether no control loop has such a sample rate
-    lost: int  # number of missing samples
-    gaps: tuple[int, ...]  # indices of the first sample after each gap
-    jitter: float  # standard deviation of the other steps over the median step
+    kind: str  # of `findings`
+    columns: tuple[str, ...]
+    numbers: Mapping[str, Any] = field(default_factory=dict)  # what its sentences name, and `share` of the samples
 
 
-@dataclass(frozen=True)
-class Clipped:
-    """A channel that repeats its largest or smallest value and reaches it at speed."""
-
-    column: str  # name of the column
-    value: float  # the repeated value, in the unit of the column
-    share: float  # share of the samples that have it
-    runs: int  # number of times that the channel reaches it
-    is_top: bool  # whether it is the largest value, not the smallest
-
-
-@dataclass(frozen=True)
-class Coarse:
-    """A channel whose steps are coarse compared with its motion."""
-
-    column: str  # name of the column
-    step: float  # width of its steps, in its unit
-    range: float  # range of its values, in its unit
-
-
-@dataclass(frozen=True)
-class Held:
-    """A channel that holds a value although other channels show that it should change."""
-
-    column: str  # name of the column
-    value: float  # the value that it holds
-    share: float  # share of the samples in which it does
-    first: tuple[float, float]  # begin and end of the first such time (s)
-
-
-def read_clock(time: Numbers) -> Clock | None:
-    """Return the time steps of a recording, or None for too few samples."""
+def clock_faults(time: Numbers) -> Iterator[Fault]:
+    """Find a sample rate that no control loop has, gaps, lost samples and uneven steps of times [N]."""
     if len(time) <= FEWEST_STEPS:
-        return None
+        return
     steps = np.diff(time)
     median = float(np.median(steps))
-    rate = 1.0 / median
-    senseless = rate <= SLOWEST * (1 + 1e-6) or rate > FASTEST
-    units = [unit for unit in CLOCK_UNITS if USUAL[0] <= rate / unit[0] <= USUAL[1]] if senseless else []
-    long = gaps(time * (units[0][0] if units else 1.0))
+    rate, unit = 1.0 / median, None
+    if rate <= SLOWEST * (1 + 1e-6) or rate > FASTEST:
+        unit = next((unit for unit in CLOCK_UNITS if USUAL[0] <= rate / unit[0] <= USUAL[1]), None)
+        of: dict[str, Any] = {"samples": counted(len(time), "sample"), "step": median, "rate": rate}
+        if unit is not None:
+            is_number = abs(median - 1.0) < 1e-9
+            of |= {"unit": unit[1] + ", or the number of the sample" * is_number, "entry": {"scale": unit[0]}}
+        yield Fault("clock" if unit else "clock, unknown", ("time",), of)
+    long = gaps(time * (unit[0] if unit else 1.0))
+    if long:
+        longest = time[long[0]] - time[long[0] - 1]
+        yield Fault("gaps", ("time",), {"count": counted(len(long), "gap"), "longest": longest, "row": long[0]})
     short = np.delete(steps, np.asarray(long, dtype=int) - 1) / median
     whole = np.round(short)
     usual = 1.4826 * float(np.median(np.abs(short - 1.0)))  # standard deviation, not affected by lost samples
     is_lost = (short > max(LOST, 1.0 + CERTAIN * usual)) & (np.abs(short - whole) < WHOLE)
-    return Clock(
-        step=median,
-        unit=units[0] if units else None,
-        senseless=senseless,
-        lost=int((whole[is_lost] - 1).sum()),
-        gaps=tuple(long),
-        jitter=float(np.std(short[~is_lost])),
-    )
+    lost = int((whole[is_lost] - 1).sum())
+    share, jitter = lost / (len(time) + lost), float(np.std(short[~is_lost]))
+    if share > LOST_SHARE:
+        missing = f"{lost} of {len(time) + lost} samples {are(lost)} missing"
+        yield Fault("lost", ("time",), {"missing": missing, "share": percent(share), "step": median})
+    if jitter > JITTER:
+        yield Fault("jitter", ("time",), {"step": median, "share": percent(jitter)})
 
 
-def clipped_channels(recording: Recording, finger: Finger) -> Iterator[Clipped]:
+def clipped_channels(recording: Recording, finger: Finger) -> Iterator[Fault]:
     """Find forces, positions and angles that saturate."""
     for name in COARSE:
         for k, column in enumerate(recording.groups.get(name, np.empty((0, 0))).T):
@@ -317,7 +278,9 @@ def clipped_channels(recording: Recording, finger: Finger) -> Iterator[Clipped]:
                 share = sum(end - begin for begin, end in runs) / len(column)
                 value = float(column.max() if is_top else column.min())
                 if share > CLIPPED_SHARE and not (name == "tendon_force" and value == 0.0):
-                    yield Clipped(f"{name}[{k + 1}]", value, share, len(runs), is_top)
+                    extreme, end = ("largest", "above") if is_top else ("smallest", "below")
+                    of = {"value": value, "share": share, "percent": percent(share), "runs": len(runs)}
+                    yield Fault("clipped", (f"{name}[{k + 1}]",), {**of, "extreme": extreme, "end": end})
 
 
 def _clipped_runs(column: Numbers) -> Runs:
@@ -355,20 +318,22 @@ def _bulges(expected: Numbers, run: tuple[int, int], resolution: float) -> bool:
     return bool(middle.mean() - ends.mean() > CERTAIN * noise + resolution)
 
 
-def coarse_channels(recording: Recording) -> Iterator[Coarse]:
+def coarse_channels(recording: Recording) -> Iterator[Fault]:
     """Find channels that move in few steps."""
     for name, finest in COARSE.items():
         for k, column in enumerate(recording.groups.get(name, np.empty((0, 0))).T):
             step, extent = value_step(column), float(np.ptp(column))
             if step > finest and extent < LEVELS * step:
-                yield Coarse(f"{name}[{k + 1}]", step, extent)
+                of = {"range": extent, "step": step, "steps": counted(round(extent / step), "step")}
+                yield Fault("coarse", (f"{name}[{k + 1}]",), {**of, "unit": GROUPS[name][0]})
 
 
-def held_channels(recording: Recording, finger: Finger) -> list[Held]:
-    """Find channels that hold a value while others change."""
-    # These are stuck sensors, and channels that never change while most of their group do.
-    stuck = stuck_sensors(recording, finger)
-    held = [_held(recording.time, column, sensors) for column, sensors in stuck.items()]
+def held_channels(recording: Recording, finger: Finger) -> Iterator[Fault]:
+    """Find stuck sensors, and channels that never change while most of their group do."""
+    stuck, time = stuck_sensors(recording, finger), recording.time
+    for column, sensors in stuck.items():
+        share = sum(sensor.end - sensor.begin for sensor in sensors) / len(time)
+        yield _held(column, sensors[0].value, share, time[sensors[0].begin], time[sensors[0].end - 1])
     for name in COARSE:
         values = recording.groups.get(name, np.empty((1, 0)))
         still = np.ptp(values, axis=0) == 0.0
@@ -376,15 +341,12 @@ def held_channels(recording: Recording, finger: Finger) -> list[Held]:
         for k in np.flatnonzero(still):
             column = f"{name}[{k + 1}]"
             if moving.sum() > still.sum() and column not in stuck:
-                span = (float(recording.time[0]), float(recording.time[-1]))
-                held.append(Held(column, float(values[0, k]), 1.0, span))
-    return held
+                yield _held(column, float(values[0, k]), 1.0, time[0], time[-1])
 
 
-def _held(time: Numbers, column: str, sensors: list[StuckSensor]) -> Held:
-    share = sum(sensor.end - sensor.begin for sensor in sensors) / len(time)
-    first = sensors[0]
-    return Held(column, first.value, share, (float(time[first.begin]), float(time[first.end - 1])))
+def _held(column: str, value: float, share: float, first: float, last: float) -> Fault:
+    of = {"value": value, "share": share, "percent": percent(share), "first": first, "last": last}
+    return Fault("held", (column,), of)
 
 
 def value_step(column: Numbers) -> float:

@@ -9,21 +9,30 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.errors import InputError
+from tendonfmu.files import counted, percent
 from tendonfmu.model import Finding, Finger, is_direct_drive
-from tendonfmu.recordings import match_text as text
 from tendonfmu.recordings.faults import (
     TURNS,
     clipped_channels,
+    clock_faults,
     coarse_channels,
     held_channels,
-    read_clock,
     still_runs,
     tendon_angles,
+)
+from tendonfmu.recordings.findings import (
+    EQUATION,
+    correction_finding,
+    element,
+    fault_finding,
+    finding_of,
+    routing_finding,
 )
 from tendonfmu.recordings.kinematics import (
     EQUATED,
@@ -43,7 +52,7 @@ from tendonfmu.recordings.recording import GROUP_PER, Recording, check_numbers
 from tendonfmu.recordings.routing import TendonRouting, clock_drift, learn_routing, routed
 from tendonfmu.recordings.signal_noise import white_noise
 from tendonfmu.recordings.tendon_springs import with_linear_springs
-from tendonfmu.recordings.traps import drift_finding, find_traps, trap_finding
+from tendonfmu.recordings.traps import find_traps
 
 UNFIT, POOR = 0.15, 0.03  # share of variance that the equations leave: above these an error, a warning
 UNFIT_FOR_SEARCH = 0.5  # the same error for a search of causes: a spring, arm or play may be what is to be found
@@ -65,22 +74,8 @@ LEFT_TO_THE_FIT = ("gaps", "held")  # kinds of findings
 
 
 def belongs(finger: Finger, recordings: Sequence[Recording], *, unfit: float = UNFIT) -> list[Finding]:
-    """Find signs that recordings do not belong to a finger, or are poor.
-
-    Parameters
-    ----------
-    finger
-        A valid description.
-    recordings
-        As `read_recording` returns them.
-    unfit
-        Share of variance that kinematics may leave unexplained before it is an error.
-
-    Returns
-    -------
-    list of Finding
-        In the order of the recordings, errors of each before its warnings. Empty if nothing was found.
-    """
+    """Find signs that recordings do not belong to a finger, or are poor: of each recording the errors first."""
+    # unfit: share of variance that kinematics may leave unexplained before it is an error
     findings: list[Finding] = []
     for recording in recordings:
         of_recording = _findings(finger, recording, unfit)
@@ -112,23 +107,23 @@ def _findings(finger: Finger, recording: Recording, unfit: float) -> list[Findin
     counts = {"tendon": len(finger.tendon_names), "joint": len(finger.joint_names)}
     wrong = [name for name, values in recording.groups.items() if values.shape[1] != counts[GROUP_PER[name]]]
     if wrong:
-        return [text.columns(recording.path, name, recording.groups[name].shape[1], counts) for name in wrong]
-    findings = list(_of_clock(recording))
-    clock = next((finding for finding in findings if finding.kind == "clock"), None)
-    unit = clock.entries.get("time", {}).get("scale") if clock else None
+        return [_of_columns(recording, name, counts) for name in wrong]
+    findings = [fault_finding(recording.path, fault) for fault in clock_faults(recording.time)]
+    unit = next((found.entries.get("time", {}).get("scale") for found in findings if found.kind == "clock"), None)
     if isinstance(unit, float):
         recording = replace(recording, time=recording.time * unit)
-    traps = [trap_finding(recording.path, found) for found in find_traps(finger, recording)]
+    traps = [fault_finding(recording.path, fault) for fault in find_traps(finger, recording)]
     if _has_error(traps):  # equations and other channels tell nothing then
         return [*findings, *traps]
     findings += traps
     kinematic, mended = _of_kinematics(finger, recording, unfit)
-    channels = held_channels(mended, finger)
-    held = []
-    for channel in channels:
-        is_dead = channel.share > HALF and channel.value != 0.0
-        held.append(text.held(recording.path, channel, "error" if is_dead else "warning"))
-    is_silent = any(channel.share > HALF for channel in channels)
+    channels = list(held_channels(mended, finger))
+    dead = [channel.numbers["share"] > HALF and channel.numbers["value"] != 0.0 for channel in channels]
+    held = [
+        fault_finding(recording.path, channel, "error" * is_dead)
+        for channel, is_dead in zip(channels, dead, strict=True)
+    ]
+    is_silent = any(channel.numbers["share"] > HALF for channel in channels)
     if not _has_error(held):  # no equation holds with a dead sensor
         findings += kinematic
         mended = _with_velocities(finger, mended, findings)
@@ -145,32 +140,32 @@ def _has_error(findings: Sequence[Finding]) -> bool:
 # --- clock and channels -----------------------------------------------------------------------------------------------
 
 
-def _of_clock(recording: Recording) -> Iterator[Finding]:
-    clock = read_clock(recording.time)
-    if clock is None:
-        return
-    if clock.senseless:
-        yield text.senseless_rate(recording.path, clock, len(recording))
-    yield from text.clock_warnings(recording.path, clock, recording.time)
+def _of_columns(recording: Recording, group: str, counts: Mapping[str, int]) -> Finding:
+    """Report a group with too many or too few columns. counts: tendons and joints of the finger."""
+    given, per = recording.groups[group].shape[1], GROUP_PER[group]
+    has = {f"{kind}s": counted(count, kind) for kind, count in counts.items()}
+    of: dict[str, Any] = {"given": counted(given, "column"), "group": group, "expected": counts[per], "per": per, **has}
+    return finding_of(recording.path, "columns", group, **of)
 
 
 def _of_channels(finger: Finger, recording: Recording, held: Sequence[Finding]) -> Iterator[Finding]:
     coarse = list(coarse_channels(recording))
     clipped = list(clipped_channels(recording, finger))
     # a channel with few steps, or one that clips often, repeats values without a fault of the sensor
-    repeating = {channel.column for channel in coarse} | {channel.column for channel in clipped if channel.runs > 1}
-    stuck = [finding for finding in held if finding.severity == "error" or finding.columns[0] not in repeating]
+    often = [channel for channel in clipped if channel.numbers["runs"] > 1]
+    repeating = {channel.columns[0] for channel in (*coarse, *often)}
+    stuck = [found for found in held if found.severity == "error" or found.columns[0] not in repeating]
     if stuck or coarse:  # the other channels do not give a reliable position then
-        clipped = [channel for channel in clipped if channel.column.startswith("tendon_force")]
+        clipped = [channel for channel in clipped if channel.columns[0].startswith("tendon_force")]
     velocity = recording.groups.get("joint_velocity", np.zeros((1, finger.joints)))
     if (share := float(left_at_rest(finger.data, velocity).mean())) > MANY_RESTS:
-        yield text.rests(recording.path, share)
+        yield finding_of(recording.path, "rests", "joint_velocity", share=percent(share))
     yield from stuck
-    reported = {finding.columns[0] for finding in stuck}
-    for channel in clipped:
-        if channel.column not in reported:
-            yield text.clipped(recording.path, channel, "error" if channel.share > MUCH_CLIPPED else "warning")
-    yield from (text.coarse(recording.path, channel) for channel in coarse if channel.column not in reported)
+    reported = {found.columns[0] for found in stuck}
+    for channel in (*clipped, *coarse):
+        if channel.columns[0] not in reported:
+            is_much = channel.kind == "clipped" and channel.numbers["share"] > MUCH_CLIPPED
+            yield fault_finding(recording.path, channel, "error" * is_much)
 
 
 # --- what the columns say of each other -------------------------------------------------------------------------------
@@ -189,29 +184,53 @@ def _of_kinematics(finger: Finger, recording: Recording, unfit: float) -> tuple[
         off = [each for each in learned if each.varying or (moved and _misleads(finger, recording, each))]
         if moved or (off and left > UNFIT):
             severity = "error" if left > unfit else "warning"
-            return [text.routing(recording.path, finger, each, severity) for each in off], recording
+            return [routing_finding(recording.path, finger, each, severity) for each in off], recording
         if (unit := _unit_of_forces(learned)) is not None:
-            return [text.force_unit(recording.path, balance.group("tendon_force"), *unit)], recording
+            forces = Correction("scale", tuple(balance.group("tendon_force")), *unit)
+            seen = "the springs stretch as if all were stiffer or softer than described by the same factor"
+            besides = ", or stiffness in another unit than N/m"
+            return [correction_finding(recording.path, forces, seen, besides=besides)], recording
         if left > UNFIT:  # a correction that removes only a part of the misfit is a guess
             worst = done[0].misfit if done else left
-            return [text.unfit(recording.path, worst, "error" if worst > unfit else "warning", balance)], recording
+            return [_unfit(recording, worst, "error" if worst > unfit else "warning", balance)], recording
         if len(done) == 1:
             done = [_likeliest(finger, recording, done[0])]
-        findings = [text.repair(recording.path, fitting) for fitting in done]
-        findings += [text.routing(recording.path, finger, each, "warning") for each in off]
+        findings = [_repaired(recording, fitting) for fitting in done]
+        findings += [routing_finding(recording.path, finger, each, "warning") for each in off]
         if (drift := clock_drift(learned)) is not None and drift.differs:
-            findings.append(drift_finding(recording.path, drift, float(np.ptp(recording.time))))
+            of: dict[str, Any] = {"ppm": 1e6 * drift.value, "half": 1e6 * drift.half}
+            apart = 1e3 * abs(drift.value) * float(np.ptp(recording.time))
+            findings.append(finding_of(recording.path, "drift", "time", **of, apart=apart))
         for fitting in done:
             recording = _mended(recording, fitting.correction)
         if left > POOR:
-            findings.append(text.unfit(recording.path, left, "warning", balance))
+            findings.append(_unfit(recording, left, "warning", balance))
     turn = np.ptp(tendon_angles(recording, finger), axis=0)
     if turn.max() > TURNS and not is_direct_drive(np.array(finger.moment_arms)):
         correction = balance.plausible_scale() if not findings else None
-        findings.append(text.turns(recording.path, turn, finger.joint_names, correction))
-        if correction is not None:
-            recording = _mended(recording, correction)
+        j = int(np.argmax(turn))
+        joint = finger.joint_names[j]
+        seen = f"tendon positions, forces and moment arms turn joint {joint} by up to {turn[j]:.4g} rad"
+        if correction is None:
+            return [*findings, finding_of(recording.path, "scale", "tendon_position", seen=seen)], recording
+        is_force = correction.columns[0].startswith("tendon_force")
+        besides = ", or tendons[...].stiffness is in another unit than N/m" * is_force
+        findings.append(correction_finding(recording.path, correction, seen, besides=besides))
+        recording = _mended(recording, correction)
     return findings, recording
+
+
+def _repaired(recording: Recording, repair: Repair) -> Finding:
+    before, after = percent(repair.misfit), percent(repair.left)
+    seen = f"{EQUATION} leaves {before} of the variance unexplained, and {after} once corrected"
+    return correction_finding(recording.path, repair.correction, seen, repair.alternatives)
+
+
+def _unfit(recording: Recording, left: float, severity: str, balance: Balance) -> Finding:
+    """Report equations that no correction makes fit."""
+    worst = balance.worst_tendon() + 1
+    column = f"tendon_position[{worst}]"
+    return finding_of(recording.path, "unfit", column, severity=severity, left=percent(left), worst=worst)
 
 
 def _routing(finger: Finger, recording: Recording) -> list[TendonRouting]:
@@ -296,11 +315,11 @@ def _mended(recording: Recording, correction: Correction) -> Recording:
     groups = {name: values.copy() for name, values in recording.groups.items()}
     if correction.kind == "exchange":
         for column, source in correction.pairs:
-            (name, k), (_, other) = text.element(column), text.element(source)
+            (name, k), (_, other) = element(column), element(source)
             groups[name][:, k] = recording.groups[name][:, other]
     else:
         for column in correction.columns:
-            name, k = text.element(column)
+            name, k = element(column)
             groups[name][:, k] *= correction.factor
     return replace(recording, groups=groups)
 
@@ -308,7 +327,10 @@ def _mended(recording: Recording, correction: Correction) -> Recording:
 def _with_velocities(finger: Finger, recording: Recording, findings: list[Finding]) -> Recording:
     """Add findings about joint velocities, and return the recording with these corrected."""
     for correction, slope in velocity_corrections(recording, finger):
-        findings.append(text.velocity(recording.path, correction, slope))
+        seen = f"the angle changes by {slope:.4g} times the integral of the velocity; expected 1"
+        if correction.kind == "exchange":
+            seen = "the angle of each joint changes with the velocity of the other joint"
+        findings.append(correction_finding(recording.path, correction, seen))
         recording = _mended(recording, correction)
     return recording
 
@@ -322,7 +344,11 @@ def _of_pushing(finger: Finger, recording: Recording, mended: set[str]) -> Itera
             continue
         force = recording.groups["tendon_force"][:, i]
         is_zero = share[i] <= NEGATIVE or column in mended or _is_sign_right(finger, recording, i)
-        yield text.pushing(recording.path, column, finger.tendon_names[i], float(share[i]), float(force.min()), is_zero)
+        of = {"share": percent(share[i]), "least": force.min(), "name": finger.tendon_names[i], "column": column}
+        severity = "error" if share[i] > HALF or not is_zero else "warning"
+        entry = None if is_zero else {"sign": -1.0}
+        kind = "pushing" if is_zero else "sign"
+        yield finding_of(recording.path, kind, column, severity=severity, entry=entry, **of)
 
 
 def _is_sign_right(finger: Finger, recording: Recording, i: int) -> bool:
@@ -342,14 +368,22 @@ def _of_reference(finger: Finger, recording: Recording) -> Iterator[Finding]:
     torque = recording.groups["tendon_force"] @ np.asarray(finger.moment_arms, dtype=float)
     left, opposed = (np.sqrt(((torque - sign * external) ** 2).mean(axis=0)) for sign in (1.0, -1.0))
     for j in np.flatnonzero(opposed < OPPOSED * left):
-        yield text.reference(recording.path, f"external_torque[{j + 1}]", float(left[j]), float(opposed[j]))
+        seen = f"joint torque minus this column leaves {left[j]:.4g} N.m rms, and {opposed[j]:.4g} N.m with sign -1"
+        yield correction_finding(recording.path, Correction("sign", (f"external_torque[{j + 1}]",), -1.0), seen)
 
 
 def _of_power(finger: Finger, recording: Recording) -> Iterator[Finding]:
     """Report joints that move against the pull of their tendons, which friction cannot cause."""
     share = power_shares(finger, recording)
-    if share is not None and share.min() < -AGAINST:
-        yield text.against(recording.path, share, finger.joint_names, _turning(finger, recording))
+    if share is None or share.min() >= -AGAINST:
+        return
+    names = " and ".join(name for name, part in zip(finger.joint_names, share, strict=True) if part < 0.0)
+    seen = f"{names} moves against the pull of its tendons ({percent(-float(share.min()))} of its power)"
+    if turning := _turning(finger, recording):
+        by_hand = ", or a finger that was moved by hand"
+        yield correction_finding(recording.path, turning[0], seen, turning[1:], by_hand)
+    else:
+        yield finding_of(recording.path, "against", "tendon_force", "tendon_position", seen=seen)
 
 
 def _turning(finger: Finger, recording: Recording) -> list[Correction]:

@@ -215,19 +215,15 @@ def _parts(time: Numbers) -> tuple[list[slice], Flags]:
 
 def _refuse_too_little(recording: Recording, parts: list[slice], usable: Flags, contact: Flags) -> None:
     if not parts:
-        raise NothingLeftError(
-            f"{recording.path}: {counted(len(recording), 'sample')} without a gap at most; expected at least {FEWEST}, "
-            "and some minutes of motion for a sound fit"
-        )
+        most = f"{counted(len(recording), 'sample')} without a gap at most"
+        raise NothingLeftError(f"{recording.path}: {most}; expected at least {FEWEST}, better some minutes of motion")
     if usable.sum() >= FEWEST:
         return
     why = f"{int(contact.sum())} of {len(recording)} are labelled contact and there is no column external_torque"
     if not contact.any():
         why = "the others are at rest, or left out for a stuck sensor"
-    raise NothingLeftError(
-        f"{recording.path}: {counted(int(usable.sum()), 'sample')} to fit to: {why}; expected at least "
-        f"{FEWEST} without contact"
-    )
+    left = f"{counted(int(usable.sum()), 'sample')} to fit to: {why}"
+    raise NothingLeftError(f"{recording.path}: {left}; expected at least {FEWEST} without contact")
 
 
 def slack_sentences(slack: Flags, finger: Finger) -> list[str]:
@@ -261,10 +257,8 @@ def _stuck(recording: Recording, finger: Finger, kinematics: int) -> tuple[Flags
             sentences.append(f"{what}: a stuck sensor; it is not used with kinematics {kinematics}")
             continue
         if lost.mean() > 0.5:
-            raise InputError(
-                f"{recording.path}: column {what}: a stuck sensor in {100 * lost.mean():.0f} % of the recording; "
-                "expected a working one"
-            )
+            share = f"in {100 * lost.mean():.0f} % of the recording"
+            raise InputError(f"{recording.path}: column {what}: a stuck sensor {share}; expected a working one")
         out |= lost
         many = int(lost.sum())
         sentences.append(
@@ -292,10 +286,9 @@ def held_out_blocks(recording: Recording, held: Held) -> Flags:
         out[part] = np.floor((block + 1) * held.share + 1e-9) > np.floor(block * held.share + 1e-9)
         blocks += 1
     if not blocks:
-        raise InputError(
-            f"{recording.path}: too short to hold out {held.share:g} of it in blocks of at least {SHORTEST_BLOCK:g} s; "
-            f"expected {2 * SHORTEST_BLOCK / held.share:.3g} s or more without a gap"
-        )
+        of_it = f"{held.share:g} of it in blocks of at least {SHORTEST_BLOCK:g} s"
+        expected = f"{2 * SHORTEST_BLOCK / held.share:.3g} s or more without a gap"
+        raise InputError(f"{recording.path}: too short to hold out {of_it}; expected {expected}")
     return out
 
 
@@ -327,10 +320,9 @@ def refuse_stillness(finger: Finger, recordings: list[FitRecording], moves: Mapp
     if not moves:
         return []
     if not any(moves.values()):
-        raise InputError(
-            f"{', '.join(str(recording.path) for recording in recordings)}: no motion: nothing is ever faster than "
-            "velocity_threshold; expected free motion of all joints (tendonfmu excite plans one)"
-        )
+        files = ", ".join(str(recording.path) for recording in recordings)
+        nothing = "no motion: nothing is ever faster than velocity_threshold"
+        raise InputError(f"{files}: {nothing}; expected free motion of all joints (tendonfmu excite plans one)")
     threshold = number_of(finger.data, "velocity_threshold.joint")
     fastest = np.max([np.abs(part.model.joint_speed[part.train]).max(axis=0) for part in recordings], axis=0)
     return [
@@ -346,18 +338,14 @@ def require_noise(finger: Finger, recordings: list[FitRecording]) -> None:
     if base > 0:
         return
     if not per_force:
-        raise InputError(
-            f"{finger.path}: bias.noise_std = 0 and bias.noise_std_per_force = 0: every residual would count "
-            "infinitely much; expected the standard deviation of the joint torque's noise in N.m"
-        )
+        given = "bias.noise_std = 0 and bias.noise_std_per_force = 0: every residual would count infinitely much"
+        raise InputError(f"{finger.path}: {given}; expected the noise of the joint torque in N.m")
     for recording in recordings:
         silent = np.flatnonzero(~recording.recording.groups["tendon_force"].any(axis=1))
         if silent.size:
             row = f"row {int(silent[0]) + 1} of {recording.path}"
-            raise InputError(
-                f"{finger.path}: bias.noise_std = 0, and {row} has no tendon force: its residual would count "
-                "infinitely much; expected bias.noise_std above 0 (N.m)"
-            )
+            given = f"bias.noise_std = 0, and {row} has no tendon force: its residual would count infinitely much"
+            raise InputError(f"{finger.path}: {given}; expected bias.noise_std above 0 (N.m)")
 
 
 # --- blocks of time ---------------------------------------------------------------------------------------------------

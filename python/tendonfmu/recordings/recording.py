@@ -286,10 +286,9 @@ class Recording:
         for name, array in self.groups.items():
             expected = tendons if GROUP_PER[name] == "tendon" else joints
             if array.shape[1] != expected:
-                raise InputError(
-                    f"{self.path}: {counted(array.shape[1], 'column')} {name}[...], expected {expected}: "
-                    f"the finger has {counted(joints, 'joint')} and {counted(tendons, 'tendon')}"
-                )
+                given = f"{counted(array.shape[1], 'column')} {name}[...], expected {expected}"
+                has = f"{counted(joints, 'joint')} and {counted(tendons, 'tendon')}"
+                raise InputError(f"{self.path}: {given}: the finger has {has}")
 
 
 def read_recording(source: RecordingSource, *, label: str = LABEL, others: Collection[str] = ()) -> Recording:
@@ -435,10 +434,8 @@ def check_numbers(recording: Recording) -> None:
         if len(wrong):
             row, column = wrong[0]
             what = f"at most {LARGEST:g}" if np.isfinite(values[row, column]) else "a finite number"
-            raise InputError(
-                f"{recording.path}: column {name}[{column + 1}], row {row + 1}: {values[row, column]:g}; "
-                f"expected {what}"
-            )
+            where = f"{recording.path}: column {name}[{column + 1}], row {row + 1}"
+            raise InputError(f"{where}: {values[row, column]:g}; expected {what}")
     if np.abs(recording.time).max(initial=0.0) > LATEST:
         raise InputError(f"{recording.path}: column time: {recording.time[-1]:g} s; expected at most {LATEST:g} s")
 
@@ -450,10 +447,8 @@ def check_times(file: Path, time: NDArray[np.float64]) -> None:
     late = np.flatnonzero(~(np.diff(time) > 0))
     if late.size:
         row = int(late[0]) + 2
-        raise InputError(
-            f"{file}: column time, row {row}: {float(time[row - 1])!r} s after {float(time[row - 2])!r} s; "
-            "expected increasing times"
-        )
+        times = f"{float(time[row - 1])!r} s after {float(time[row - 2])!r} s"
+        raise InputError(f"{file}: column time, row {row}: {times}; expected increasing times")
 
 
 def _refuse_time_in_index(file: Path, frame: pd.DataFrame) -> None:

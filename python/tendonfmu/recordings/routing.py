@@ -199,10 +199,8 @@ def require_routing(finger: Finger, recordings: Sequence[Recording]) -> list[Ten
             else "no recording; expected at least one"
         )
     if any(number.is_absurd for each in learned for number in each.numbers):
-        raise InputError(
-            f"{recordings[0].path}: the columns do not belong to the description, so no routing can be learned; "
-            "tendonfmu check says what is wrong"
-        )
+        wrong = "the columns do not belong to the description; tendonfmu check says what is wrong"
+        raise InputError(f"{recordings[0].path}: no routing can be learned: {wrong}")
     return learned
 
 

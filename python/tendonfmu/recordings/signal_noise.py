@@ -34,26 +34,9 @@ LEAST = 1e-6  # rad: no sensor of a joint resolves less
 
 
 def joint_position_noise(data: Mapping[str, Any], recording: Recording | FitRecording, kinematics: int = 1) -> Numbers:
-    """Estimate the standard deviation of the noise of the joint angles in one sample.
+    """Estimate the standard deviation [n] (rad) of the noise of the joint angles in one sample.
 
-    Parameters
-    ----------
-    data
-        A valid finger description.
-    recording
-        The recording. A `FitRecording` has its own kinematics.
-    kinematics
-        1: angles from tendon positions and forces. 2, 3: measured joint positions.
-
-    Returns
-    -------
-    Numbers
-        [n] (rad), at least 1e-6.
-
-    Raises
-    ------
-    InputError
-        The recording has no such columns, or fewer than 60 samples without a gap.
+    kinematics 1: angles from tendon positions and forces; 2, 3: measured ones. A `FitRecording` has its own.
     """
     if isinstance(recording, FitRecording):
         kinematics = recording.kinematics
@@ -78,9 +61,7 @@ def white_noise(time: Numbers, values: Numbers) -> Numbers:
     # time: [N] (s); values: [N, c]; returns [c], in the unit of the values
     reach = max(NEIGHBOURS)
     if len(time) < FEWEST:
-        raise InputError(
-            f"recording of {counted(len(time), 'sample')}: expected at least {FEWEST} to estimate noise from"
-        )
+        raise InputError(f"recording of {counted(len(time), 'sample')}: expected at least {FEWEST} to estimate noise")
     at = np.arange(reach, len(time) - reach)
     distance = np.stack([time[at + offset] - time[at] for offset in NEIGHBOURS])  # [4, K]
     weights = np.stack([_lagrange(distance, k) for k in range(len(NEIGHBOURS))])
@@ -92,9 +73,8 @@ def white_noise(time: Numbers, values: Numbers) -> Numbers:
     whole = np.lib.stride_tricks.sliding_window_view(steps, 2 * reach).max(axis=1) <= GAP * np.median(steps)
     left = left[whole]
     if len(left) < FEWEST - 2 * reach:
-        raise InputError(
-            f"recording of {counted(len(left), 'sample')} without a gap: expected at least {FEWEST - 2 * reach}"
-        )
+        given = f"recording of {counted(len(left), 'sample')} without a gap"
+        raise InputError(f"{given}: expected at least {FEWEST - 2 * reach}")
     size = min(BLOCK, len(left))
     blocks = left[: len(left) // size * size].reshape(-1, size, left.shape[1])
     return np.array([_of_blocks(column) for column in (blocks**2).mean(axis=1).T])

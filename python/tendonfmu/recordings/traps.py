@@ -6,18 +6,16 @@ Nothing here uses a friction model. A trap is reported once for each column, or 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tendonfmu.arrays import Numbers, flagged_rows
-from tendonfmu.model import Finding, Finger
-from tendonfmu.recordings.counters import finest, wrap_of
-from tendonfmu.recordings.faults import tendon_angles
+from tendonfmu.model import Finger
+from tendonfmu.recordings.faults import Fault, tendon_angles, value_step
 from tendonfmu.recordings.kinematics import UNITS
 from tendonfmu.recordings.recording import Recording
-from tendonfmu.recordings.routing import Learned
 
 NEAR_ZERO, TOUCHES = 0.02, 0.005  # of the largest value, and of the samples that are so small
 AT_ZERO = 0.005  # of the largest value: the smallest
@@ -38,25 +36,14 @@ FAR, NEIGHBOURS = 3.0, 20  # largest steps among so many samples before and afte
 ROUNDING = 0.01  # of a value, by the digits of a log
 
 
-@dataclass(frozen=True)
-class Trap:
-    """What is wrong with columns."""
-
-    kind: str  # "magnitude", "wrapped", "filled", "slow", "repeated" or "switched"
-    columns: tuple[str, ...]
-    size: float  # steps of a word, s of a line, samples between changes, % of the samples, factor of the unit
-    at: float = 0.0  # s, where it begins
-    what: str = ""  # the joint, or the unit
-
-
-def find_traps(finger: Finger, recording: Recording) -> Iterator[Trap]:
+def find_traps(finger: Finger, recording: Recording) -> Iterator[Fault]:
     """Find the traps of a recording. They are of `recording`, before any correction."""
     yield from _magnitudes(finger, recording)
     groups = {name: recording.groups[name] for name in UNITS if name in recording.groups}
     for name, values in groups.items():
         for k, column in enumerate(values.T):
             if (word := wrap_of(column, name.endswith("position"))) is not None:
-                yield Trap("wrapped", (f"{name}[{k + 1}]",), word / (finest(column) or 1.0))
+                yield Fault("wrapped", (f"{name}[{k + 1}]",), {"steps": word / (finest(column) or 1.0)})
     yield from _filled(recording.time, groups)
     yield from _slow(recording.time, groups)
     yield from _switched(recording.time, groups)
@@ -81,17 +68,17 @@ def is_magnitude(force: Numbers, angle: Numbers) -> bool:
     return rests or min(pulls) > ALIKE * max(pulls)
 
 
-def _magnitudes(finger: Finger, recording: Recording) -> Iterator[Trap]:
+def _magnitudes(finger: Finger, recording: Recording) -> Iterator[Fault]:
     angle = recording.groups.get("joint_position")
     angle = tendon_angles(recording, finger) if angle is None else angle
     for i, tendon in enumerate(finger.data["tendons"]):
         joint = int(np.argmax(np.abs(tendon["moment_arms"])))
         force = recording.groups["tendon_force"][:, i]
         if tendon.get("bidirectional") and is_magnitude(force, angle[:, joint]):
-            yield Trap("magnitude", (f"tendon_force[{i + 1}]",), 0.0, what=finger.joint_names[joint])
+            yield Fault("magnitude", (f"tendon_force[{i + 1}]",), {"joint": finger.joint_names[joint]})
 
 
-def _filled(time: Numbers, groups: Mapping[str, Numbers]) -> Iterator[Trap]:
+def _filled(time: Numbers, groups: Mapping[str, Numbers]) -> Iterator[Fault]:
     """Yield the longest time in which all channels that change are straight lines."""
     columns = np.column_stack(list(groups.values()))
     columns = columns[:, np.ptp(columns, axis=0) > 0.0]
@@ -104,17 +91,17 @@ def _filled(time: Numbers, groups: Mapping[str, Numbers]) -> Iterator[Trap]:
         return
     begin, end = max(flagged_rows(line), key=lambda run: run[1] - run[0], default=(0, 0))
     if end - begin >= FEWEST and time[end] - time[begin] > LONGEST_STRAIGHT:
-        yield Trap("filled", tuple(groups), float(time[end + 1] - time[begin]), float(time[begin]))
+        yield Fault("filled", tuple(groups), {"duration": time[end + 1] - time[begin], "at": time[begin]})
 
 
-def _slow(time: Numbers, groups: Mapping[str, Numbers]) -> Iterator[Trap]:
+def _slow(time: Numbers, groups: Mapping[str, Numbers]) -> Iterator[Fault]:
     """Yield the groups whose columns change at every so-many-th sample only, as of a slower sensor."""
     for name, values in groups.items():
         between = [found for column in values.T if (found := _between_changes(column)) is not None]
         if len(between) == values.shape[1]:
-            yield Trap("slow", (name,), float(np.median(between)), what=f"{1.0 / np.median(np.diff(time)):.4g}")
+            yield Fault("slow", (name,), {"samples": np.median(between), "rate": 1.0 / np.median(np.diff(time))})
         elif name.endswith("position") and (share := _repeats(values)) > REPEATED:
-            yield Trap("repeated", (name,), 100.0 * share)
+            yield Fault("repeated", (name,), {"share": 100.0 * share})
 
 
 def _repeats(values: Numbers) -> float:
@@ -144,7 +131,7 @@ def _between_changes(column: Numbers) -> float | None:
     return float(apart[apart <= pair[1] + 1].mean()) if pair[1] > 1 and pair[0] > REGULAR * len(apart) else None
 
 
-def _switched(time: Numbers, groups: Mapping[str, Numbers]) -> Iterator[Trap]:
+def _switched(time: Numbers, groups: Mapping[str, Numbers]) -> Iterator[Fault]:
     """Yield columns that move, from some time on, by the factor of a unit more or less, and no other group does."""
     parts = np.array_split(np.arange(len(time) - 1), WINDOWS)
     if len(time) < WINDOWS * 3 * FEWEST:
@@ -169,7 +156,8 @@ def _switched(time: Numbers, groups: Mapping[str, Numbers]) -> Iterator[Trap]:
                 turned = factor if (change > 0.0) == (factor > 1.0) else 1.0 / factor
                 is_near = abs(change / np.log(turned) - 1.0) < OFF
                 if is_near and _jumps_by(groups[name][near, k], turned):
-                    yield Trap("switched", (f"{name}[{k + 1}]",), float(np.exp(change)), begin, unit)
+                    numbers = {"factor": np.exp(change), "at": begin, "unit": unit}
+                    yield Fault("switched", (f"{name}[{k + 1}]",), numbers)
                     break
 
 
@@ -187,62 +175,103 @@ def _jumps_by(column: Numbers, factor: float) -> bool:
     return False
 
 
-# --- in words ---------------------------------------------------------------------------------------------------------
+# --- counters that start again: signed words stored as unsigned, encoders of many turns, timers that overflow ---------
+
+EMPTY = 0.1  # of the range: the widest part that no sample reaches
+GRID = 0.01  # of the smallest difference: others are as near to a multiple of it
+LEAST_WORD = 128.0  # steps; sensors use each second or fourth step of a word, too
+SAME = 0.02  # relative, between the jumps and the word
+SHORT, OPPOSITE = 0.25, 0.8  # of the range: the steps of a turning encoder between its jumps; share of jumps backwards
+# readings of one turn or word: powers of two, degrees and their parts, radians, whole turns, decimal encoders
+DECIMAL = [float(digits * 10**k) for k in range(4) for digits in (1000, 2000, 2400, 4000, 5000, 8000)]
+CIRCLES = np.array([2.0 * np.pi, *(2.0**k for k in range(7, 33)), *(360.0 * 10**k for k in range(4)), *DECIMAL])
+# a counter of 16, 24, 31 or 32 bits, and one of 32 bits in ms or µs written in coarser units; a day in s, ms and ns
+OVERFLOWS = (2.0**16, 2.0**24, 2.0**31, 2.0**32, 2.0**32 / 1e3, 2.0**32 / 1e6, 86400.0, 86400e3, 86400e9)
+FRACTIONS = (1e3, 1e6, 1e9)  # ms, µs and ns beyond a second, which start again many times
 
 
-# what is seen, its probable cause, what to write: of `traps.Trap`, by kind
-_TRAPS = {
-    "magnitude": (
-        "error",
-        "never negative while {what} moves both ways: a magnitude",
-        "a current or load without its sign",
-        "log the signed number; friction cannot be learned from a magnitude",
-    ),
-    "wrapped": (
-        "error",
-        "jumps by {size:.0f} steps",
-        "signed numbers stored as unsigned, an encoder of many turns, or a counter that overflows",
-        'write into the map of columns, at this column: "wrap": {size:.0f} if its unit is a step',
-    ),
-    "filled": (
-        "warning",
-        "straight lines in all channels for {size:.3g} s from {at:.4g} s",
-        "a gap that was filled by interpolation",
-        "cut this time out, or leave the gap in the log",
-    ),
-    "slow": (
-        "warning",
-        "changes only once in {size:.3g} samples, of {what} a second",
-        "a log resampled from a slower sensor",
-        "log at the sensor's own rate, or let convert table interpolate with the sensor's own time",
-    ),
-    "repeated": (
-        "warning",
-        "{size:.2g} % of the samples repeat the one before in the middle of a motion",
-        "written by another clock than the sensor's: velocities jump there",
-        "log each sample with the sensor's own time, or smooth the velocity (velocity_cutoff)",
-    ),
-    "switched": (
-        "error",
-        "moves {size:.4g} times as much after {at:.4g} s as before, and no other signal does",
-        "another unit from there on ({what})",
-        "convert both parts by themselves, each with its unit",
-    ),
-}
+def unwrapped(readings: NDArray[Any], wrap: float, last: float) -> NDArray[np.float64]:
+    """Return readings [N] of a counter without its jumps: each within half a turn of the one before, or of `last`."""
+    steps = np.diff(readings, prepend=last)
+    path = last + np.cumsum((steps + wrap / 2.0) % wrap - wrap / 2.0)
+    # whole turns alone are added, so that readings do not change by rounding
+    return np.asarray(readings + wrap * np.round((path - readings) / wrap), dtype=np.float64)
 
 
-def trap_finding(path: Path, found: Trap) -> Finding:
-    """Describe a trap that shows in the channels alone."""
-    severity, *texts = _TRAPS[found.kind]
-    seen, probably, write = (text.format(size=found.size, at=found.at, what=found.what) for text in texts)
-    return Finding(severity, found.kind, path, found.columns, seen, probably, write)
+def overflow(times: NDArray[Any]) -> float | None:
+    """Return the readings after which a timer [N] starts again at 0, or None."""
+    steps = np.diff(times.astype(np.float64))
+    falls = np.flatnonzero(steps < 0.0)
+    rises = steps[steps > 0.0]
+    if not len(falls) or not len(rises):
+        return None
+    beyond = max(10.0 * float(np.median(rises)), 1.0)  # a step over the end may be longer than the usual ones
+    for word in (*OVERFLOWS, *(FRACTIONS if len(falls) > 1 else ())):
+        over = word + steps[falls]
+        is_over = (over >= 0.0).all() and (over < beyond).all() and beyond < 0.5 * word
+        if is_over and (times <= word).all():
+            return float(word)
+    return None
 
 
-def drift_finding(path: Path, found: Learned, duration: float) -> Finding:
-    """Describe clocks that run apart."""
-    seen = (
-        f"the joint positions run {1e6 * found.value:+.3g} ± {1e6 * found.half:.2g} ppm against the tendons, "
-        f"{1e3 * abs(found.value) * duration:.2g} ms over this recording"
-    )
-    write = "log all signals with one clock, or let convert table bring both onto one"
-    return Finding("warning", "drift", path, ("time",), seen, "two clocks", write)
+def wrap_of(column: Numbers, turns: bool = True) -> float | None:
+    """Return the readings after which a word, or with turns an encoder, [N] starts again, in its unit, or None."""
+    if len(column) < 3 or not np.abs(np.diff(column)).max() > 0.5 * np.ptp(column):
+        return None  # a counter jumps by nearly its range
+    step = finest(column)
+    steps = _word(column, step) if step else None
+    if steps is None:
+        return _turn(column, step) if turns else None
+    return steps * step
+
+
+def finest(column: Numbers) -> float:
+    """Return the width of a column's steps [N], or 0 if it has none."""
+    step = np.diff(column)
+    if not step.any():
+        return 0.0
+    sizes = np.abs(step[step != 0.0])
+    multiples = sizes / sizes.min()
+    is_grid = np.abs(multiples - np.round(multiples)).max() < GRID
+    return value_step(column) or (float(sizes.min()) if is_grid else 0.0)
+
+
+def _word(column: Numbers, finest_step: float) -> float | None:
+    """Return the steps by which a column jumps if they are those of a word of a computer and no value is between."""
+    levels, step = np.unique(column), np.diff(column)
+    if len(levels) < 3:
+        return None
+    widest = int(np.argmax(np.diff(levels)))
+    above = column > (levels[widest] + levels[widest + 1]) / 2.0
+    jumps = np.abs(step[np.diff(above)])
+    if levels[widest + 1] - levels[widest] < EMPTY * float(np.ptp(column)) or not len(jumps):
+        return None
+    count = float(np.median(jumps)) / finest_step
+    word = float(2.0 ** np.round(np.log2(count)))
+    return word if word >= LEAST_WORD and abs(count / word - 1.0) < SAME else None
+
+
+def _turn(column: Numbers, finest_step: float) -> float | None:
+    """Return the readings of one turn of an encoder that jumps back from one end of its range to the other."""
+    steps, span = np.diff(column), float(np.ptp(column))
+    is_jump = np.abs(steps) > span / 2.0
+    if not is_jump.any() or np.abs(steps[~is_jump]).max(initial=np.inf if is_jump.all() else 0.0) > SHORT * span:
+        return None
+    if np.diff(np.unique(column)).max() > EMPTY * span:
+        return None
+    smooth = np.where(is_jump, np.nan, steps)
+    beside = np.stack([np.concatenate([[np.nan], smooth[:-1]]), np.concatenate([smooth[1:], [np.nan]])])
+    known = ~np.isnan(beside)
+    motion = np.where(known, beside, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+    jumps, motion = steps[is_jump], motion[is_jump]
+    if (jumps * motion <= 0.0).mean() < OPPOSITE or not motion.any():
+        return None
+    size = float(np.median(np.abs(jumps - motion)))
+    # in SI, a step of the encoder is the unit in which its turn is a round number
+    units = [1.0, finest_step] if finest_step else [1.0]
+    sizes = np.concatenate([CIRCLES * unit for unit in units])
+    fitting = sizes[(sizes >= span * (1.0 - 1e-9)) & (np.abs(sizes / size - 1.0) < SAME)]
+    if len(fitting):
+        return float(fitting[np.argmin(np.abs(fitting - size))])
+    usual = float(f"{span + finest_step:.3g}")  # an encoder of another number of steps, which has been all around
+    return usual if len(jumps) > 2 and usual >= span and abs(usual / size - 1.0) < SAME else None

@@ -1,8 +1,8 @@
 """What MAP.json of `tendonfmu convert table` says: which column of a log becomes which of ours, in which unit.
 
 Each of our columns is  sign · scale · factor of the unit · (reading − offset); `wrap` first takes the jumps out of
-readings of a counter that starts again. Where `convert inspect` could not
-decide, a value is "?", which is refused here. docs/reference/commands/convert.md explains the keys, and
+readings of a counter that starts again. Where `convert inspect` could not decide, a value is
+"?", which is refused here. docs/reference/commands/convert.md explains the keys, and
 `schema/map.schema.json`, made from `map_types`, is for editors.
 """
 
@@ -12,7 +12,7 @@ import codecs
 import json
 import re
 import zoneinfo
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -28,6 +28,7 @@ from tendonfmu.recordings.recording import GROUPS, LABEL
 
 FORMAT = "tendonfmu-map-1"
 LARGEST = 1e12  # of offsets and scales, as of the signals of a recording
+LEAVE_OUT = "leave out"
 UNDECIDED = "?"  # written by `convert inspect`, refused by `convert table`
 SEPARATORS = (",", ";", "\t", "|", " ")
 GROUP_MARKS = (",", ".", " ", "'")  # between thousands
@@ -92,7 +93,7 @@ class Joint:
 
 @dataclass(frozen=True)
 class LogFormat:
-    """How a log is written, and what to do about its faults."""
+    """How a log is written, and what to do about its faults: `log` of the map."""
 
     separator: str | None = None  # of texts
     decimal: str | None = None
@@ -101,11 +102,15 @@ class LogFormat:
     header: bool | None = None
     units_row: bool | None = None
     encoding: str | None = None
-    leave_out_missing: bool = False  # whether rows without a number are left out; otherwise they are refused
-    # whether rows are sorted by time, and all but the first with the same time left out; otherwise they are refused
-    sort: bool = False
+    missing: str = "refuse"  # rows without a number; or "leave out"
+    disorder: str = "refuse"  # rows whose time does not increase; or "sort", and leave out what has the same time
     # column of time by topic, where it is not the obvious one
     clocks: Mapping[str, MappedColumn] = field(default_factory=dict)
+
+    @property
+    def leaves_out(self) -> bool:
+        """Whether rows without a number are left out."""
+        return self.missing == LEAVE_OUT
 
 
 @dataclass(frozen=True)
@@ -114,7 +119,7 @@ class Resampling:
 
     rate: float | None = None  # samples per second
     largest_gap: float | None = None  # s; None: ten times the median step of each topic
-    leave_out_gaps: bool = False  # whether samples in larger gaps are left out; otherwise the gap is refused
+    gaps: str = "refuse"  # samples in larger gaps; or "leave out"
 
 
 @dataclass(frozen=True)
@@ -153,9 +158,9 @@ def read_log_format(path: Path) -> LogFormat:
     node = Node(read_json(path, "a map of columns"))
     try:
         node.member("format").choice(FORMAT)
-        undecided = ("missing", "disorder")
-        log = {key: value for key, value in (node.member("log").value or {}).items() if key not in undecided}
-        return replace(_read_log(Node(log, "log")), leave_out_missing=True)
+        log = node.member("log").value or {}
+        log = {key: value for key, value in log.items() if key not in ("missing", "disorder")}
+        return replace(_read_log(Node(log, "log")), missing=LEAVE_OUT)
     except Refusal as refused:
         raise InputError(f"{path}: {refused}") from None
 
@@ -172,34 +177,42 @@ def _read(path: Path, node: Node) -> ColumnMap:
 
 
 def _read_log(node: Node) -> LogFormat:
-    if node.absent:
-        return LogFormat()
-    layout = ("separator", "decimal", "thousands", "skip", "header", "units_row", "encoding")
-    node.keys((*layout, "missing", "disorder", "clocks"))
-    separator, decimal, skip = node.member("separator"), node.member("decimal"), node.member("skip")
-    thousands = node.member("thousands")
-    encoding, missing, disorder = node.member("encoding"), node.member("missing"), node.member("disorder")
-    for undecided, choices in ((missing, "refuse or leave out"), (disorder, "refuse or sort")):
-        if undecided.value == UNDECIDED:
-            undecided.refuse(f"a decision that `convert inspect` has left to you: {choices}")
     return LogFormat(
-        separator=None if separator.absent else separator.choice(*SEPARATORS),
-        decimal=None if decimal.absent else decimal.choice(".", ","),
-        thousands=None if thousands.absent else thousands.choice(*GROUP_MARKS),
-        skip=None if skip.absent else skip.integer(0, 10000),
-        header=_flag(node.member("header")),
-        units_row=_flag(node.member("units_row")),
-        encoding=None if encoding.absent else _encoding(encoding),
-        leave_out_missing=not missing.absent and missing.choice("refuse", "leave out") == "leave out",
-        sort=not disorder.absent and disorder.choice("refuse", "sort") == "sort",
-        clocks=_read_clocks(node.member("clocks")),
+        **_read_keys(
+            node,
+            {
+                "separator": lambda key: key.choice(*SEPARATORS),
+                "decimal": lambda key: key.choice(".", ","),
+                "thousands": lambda key: key.choice(*GROUP_MARKS),
+                "skip": lambda key: key.integer(0, 10000),
+                "header": _flag,
+                "units_row": _flag,
+                "encoding": _encoding,
+                "missing": lambda key: _decided(key, "refuse or leave out").choice("refuse", LEAVE_OUT),
+                "disorder": lambda key: _decided(key, "refuse or sort").choice("refuse", "sort"),
+                "clocks": _read_clocks,
+            },
+        )
     )
 
 
-def _flag(node: Node) -> bool | None:
-    if not node.absent and not isinstance(node.value, bool):
+def _read_keys(node: Node, readers: Mapping[str, Callable[[Node], Any]]) -> dict[str, Any]:
+    """Return the values of the keys of an object, of those that are there."""
+    members = {} if node.absent else {key: node.member(key) for key in node.keys(readers).value}
+    return {key: readers[key](member) for key, member in members.items() if not member.absent}
+
+
+def _decided(node: Node, choices: str) -> Node:
+    """Refuse what `convert inspect` has not decided."""
+    if node.value == UNDECIDED:
+        node.refuse(f"a decision that `convert inspect` has left to you: {choices}")
+    return node
+
+
+def _flag(node: Node) -> bool:
+    if not isinstance(node.value, bool):
         node.refuse("true or false")
-    return None if node.absent else bool(node.value)
+    return bool(node.value)
 
 
 def _encoding(node: Node) -> str:
@@ -210,22 +223,17 @@ def _encoding(node: Node) -> str:
 
 
 def _read_clocks(node: Node) -> dict[str, MappedColumn]:
-    if node.absent:
-        return {}
     names = node.keys(node.value if isinstance(node.value, dict) else ()).value
     return {name: _read_column(node.member(name), units.TIME) for name in names}
 
 
 def _read_resampling(node: Node) -> Resampling | None:
-    if node.absent:
-        return None
-    node.keys(("rate", "largest_gap", "gaps"))
-    rate, gap, gaps = node.member("rate"), node.member("largest_gap"), node.member("gaps")
-    return Resampling(
-        None if rate.absent else rate.number(0.0, 1e6, "Hz", above=True),
-        None if gap.absent else gap.number(0.0, 1e6, "s", above=True),
-        not gaps.absent and gaps.choice("refuse", "leave out") == "leave out",
-    )
+    readers: dict[str, Callable[[Node], Any]] = {
+        "rate": lambda key: key.number(0.0, 1e6, "Hz", above=True),
+        "largest_gap": lambda key: key.number(0.0, 1e6, "s", above=True),
+        "gaps": lambda key: key.choice("refuse", LEAVE_OUT),
+    }
+    return None if node.absent else Resampling(**_read_keys(node, readers))
 
 
 def _read_columns(node: Node) -> Iterator[tuple[str, MappedColumn]]:
@@ -261,64 +269,56 @@ def _read_joint(node: Node) -> tuple[dict[str, MappedColumn], Joint]:
         if node.member(word).absent:
             node.member(word).refuse(f"the log's column of it, in one of {', '.join(parts[word])}")
     name, cutoff = node.member("name"), node.member("velocity_cutoff")
-    joint = Joint(
-        kind, "joint" if name.absent else name.text("a name"), None if cutoff.absent else cutoff.number(0.0, 1e6, "Hz")
-    )
-    columns = {
-        word: _read_column(node.member(word), known) for word, known in parts.items() if not node.member(word).absent
-    }
-    return columns, joint
+    wanted = None if cutoff.absent else cutoff.number(0.0, 1e6, "Hz")
+    columns = {word: node.member(word) for word in parts if not node.member(word).absent}
+    joint = Joint(kind, "joint" if name.absent else name.text("a name"), wanted)
+    return {word: _read_column(column, parts[word]) for word, column in columns.items()}, joint
 
 
 def _read_column(node: Node, known: Mapping[str, float]) -> MappedColumn:
-    rate = node.member("rate") if known is units.TIME and isinstance(node.value, dict) else Node(None)
+    is_time = known is units.TIME
+    rate = node.member("rate") if is_time and isinstance(node.value, dict) else Node(None)
     if not rate.absent:
         node.keys(("rate", "comment"))
         return MappedColumn(node.path, "", rate=rate.number(0.0, 1e6, "rows a second", above=True))
-    extra = ("zone", "pattern") if known is units.TIME else ()
+    extra = ("zone", "pattern") if is_time else ()
     node.keys(("column", "unit", "sign", "scale", "offset", "wrap", "comment", *extra))
-    source, unit = node.member("column"), node.member("unit")
-    unit_names = [*known, *units.STAMPS] if known is units.TIME else list(known)
-    for undecided, choices in ((source, "the name of a column of the log"), (unit, f"one of {', '.join(unit_names)}")):
-        if undecided.value == UNDECIDED:
-            undecided.refuse(f"a decision that `convert inspect` has left to you: {choices}")
+    unit_names = [*known, *units.STAMPS] if is_time else list(known)
+    source = _decided(node.member("column"), "the name of a column of the log")
+    unit = _decided(node.member("unit"), f"one of {', '.join(unit_names)}")
     if isinstance(source.value, int) and not isinstance(source.value, bool) and source.value >= 1:
         column: str | int = source.value
     else:
         column = source.text("the name of a column of the log, or its number from 1")
-    if known is units.TIME and unit.value in units.STAMPS:
-        return _read_stamp(node, column, str(unit.value))
-    for key in extra:
+    stamp = str(unit.value) if is_time and unit.value in units.STAMPS else ""
+    for key in ("sign", "scale", "offset", "wrap") if stamp else ():
+        if not node.member(key).absent:
+            node.member(key).refuse(f'no such key with "unit": "{stamp}"; time counts from the first row')
+    for key in extra if stamp != "datetime" else ():
         if not node.member(key).absent:
             node.member(key).refuse('no such key without "unit": "datetime"')
+    if stamp:  # the recording's time counts from the first of them
+        pattern = node.member("pattern")
+        shape = "" if pattern.absent else pattern.text("a pattern of Python's strptime, such as %d.%m.%Y %H:%M:%S.%f")
+        return MappedColumn(node.path, column, 1e-9, None, stamp, _zone(node.member("zone")), shape)
     sign = node.member("sign").integer(-1, 1, 1)
     if sign == 0:
         node.member("sign").refuse("1 or -1")
     scale = node.member("scale").number(0.0, LARGEST, "", 1.0, above=True)
     offset = node.member("offset")
-    first = offset.value == "first"
-    start = None if first else offset.number(-LARGEST * 1e9, LARGEST * 1e9, "the log's unit", 0.0)
+    is_first = offset.value == "first"
+    start = None if is_first else offset.number(-LARGEST * 1e9, LARGEST * 1e9, "the log's unit", 0.0)
     wrap = node.member("wrap").number(0.0, LARGEST, "the log's unit", 0.0)
     factor = sign * scale * _factor(unit, known, unit_names)
     return MappedColumn(node.path, column, factor, start, wrap=wrap, turns=known in TURNING_QUANTITIES)
 
 
-def _read_stamp(node: Node, column: str | int, stamp: str) -> MappedColumn:
-    """Read a column of points in time. The recording's time counts from the first of them."""
-    for key in ("sign", "scale", "offset", "wrap"):
-        if not node.member(key).absent:
-            node.member(key).refuse(f'no such key with "unit": "{stamp}"; time counts from the first row')
-    zone, pattern = node.member("zone"), node.member("pattern")
-    for text in (zone, pattern):
-        if not text.absent and stamp != "datetime":
-            text.refuse('no such key without "unit": "datetime"')
-    name = "UTC" if zone.absent else zone.text("the name of a time zone, such as Europe/Berlin")
+def _zone(node: Node) -> str:
+    name = "UTC" if node.absent else node.text("the name of a time zone, such as Europe/Berlin")
     try:
-        zoneinfo.ZoneInfo(name)
+        return zoneinfo.ZoneInfo(name).key
     except (zoneinfo.ZoneInfoNotFoundError, ValueError, OSError):
-        zone.refuse("the name of a time zone, such as Europe/Berlin")
-    shape = "" if pattern.absent else pattern.text("a pattern of Python's strptime, such as %d.%m.%Y %H:%M:%S.%f")
-    return MappedColumn(node.path, column, 1e-9, None, stamp, name, shape)
+        node.refuse("the name of a time zone, such as Europe/Berlin")
 
 
 def _factor(unit: Node, known: Mapping[str, float], names: list[str]) -> float:

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
-from tendonfmu.recordings.converters.channel_rows import ChannelRows
 from tendonfmu.recordings.converters.column_map import LogFormat, MappedColumn
 from tendonfmu.recordings.converters.log import (
     NUMBER,
@@ -20,6 +19,7 @@ from tendonfmu.recordings.converters.log import (
     OTHER,
     TEXT,
     TIME,
+    ChannelRows,
     Field,
     Log,
     SplitStamps,
@@ -29,7 +29,7 @@ from tendonfmu.recordings.converters.log import (
 from tendonfmu.recordings.converters.stamps import nanoseconds, pattern_of
 from tendonfmu.recordings.converters.text_log import TextLog
 from tendonfmu.recordings.converters.units import stated
-from tendonfmu.recordings.counters import overflow, unwrapped, wrap_of
+from tendonfmu.recordings.traps import overflow, unwrapped, wrap_of
 
 GAP = 10.0  # median steps
 CLOCKS = 10.0 ** np.arange(-9, 10)  # s, ms, µs and ns against each other
@@ -56,6 +56,11 @@ class FieldSummary:
     rising: bool = True  # whether each number is above the one before, and the first and last of them
     first: float = np.nan
     last: float = -np.inf
+
+    @property
+    def source(self) -> str | int:
+        """The field as a map names it: its name, or its number if that is not unique."""
+        return self.field.name if self.key == self.field.name else int(self.key[len(NUMBERED) :])
 
     def add(self, values: Any) -> None:
         """Take a block of the field."""
@@ -85,8 +90,8 @@ class FieldSummary:
         if not both.any():
             return 0.0
         mine, its = (values[both] - values[both].mean() for values in (self.sample, other.sample))
-        size = float(np.sqrt((mine**2).sum() * (its**2).sum()))
-        return float((mine * its).sum()) / size if size > 0.0 else 0.0
+        size = float(np.linalg.norm(mine) * np.linalg.norm(its))
+        return float(mine @ its) / size if size > 0.0 else 0.0
 
 
 @dataclass
@@ -165,7 +170,7 @@ class Inspection:
 
 def inspect_log(file: Path, log: Log | None = None, settings: LogFormat | None = None) -> Inspection:
     """Read a log and summarise it. log: the log, if it is open. settings: what is known of its format."""
-    log = log or open_log(file, settings or LogFormat(leave_out_missing=True))
+    log = log or open_log(file, settings or LogFormat(missing="leave out"))
     topics = {topic.name: _empty_summary(topic) for topic in log.topics}
     wanted = {name: [part.key for part in topic.fields if part.field.kind != OTHER] for name, topic in topics.items()}
     texts = [part.key for topic in topics.values() for part in topic.fields if part.field.kind == TEXT]
@@ -183,11 +188,8 @@ def _traps(topic: TopicSummary) -> Iterator[str]:
         if summary.wrap and not (clock and summary.field.name == clock.name):
             counters.setdefault(summary.wrap, []).append(summary.field.name)
     for wrap, names in counters.items():
-        yield (
-            f"{', '.join(names)}: jumps by {wrap:.6g}: signed numbers stored as unsigned, an encoder of many turns, or "
-            f'a counter that overflows; "wrap": {wrap:.6g} in the map takes the jumps out; of an encoder, the first '
-            "reading is taken within half a turn of the offset"
-        )
+        why = "signed numbers stored as unsigned, an encoder of many turns, or a counter that overflows"
+        yield f'{", ".join(names)}: jumps by {wrap:.6g}: {why}; "wrap": {wrap:.6g} in the map takes the jumps out'
     for summary in topic.fields:
         name = summary.field.name
         if clock is not None and name == clock.name and clock.wrap:
@@ -276,15 +278,13 @@ def _settings(log: Log) -> dict[str, Any]:
     if not isinstance(log, TextLog):
         return {}
     layout = log.layout
-    settings: dict[str, Any] = {"separator": layout.separator, "decimal": layout.decimal}
-    if log.encoding not in ("utf-8", "utf-8-sig"):
-        settings["encoding"] = log.encoding
-    if layout.thousands:
-        settings["thousands"] = layout.thousands
-    if layout.skip:
-        settings["skip"] = layout.skip
-    if not layout.header:
-        settings["header"] = False
-    if layout.has_units_row:
-        settings["units_row"] = True
-    return settings
+    found = {
+        "separator": layout.separator,
+        "decimal": layout.decimal,
+        "encoding": "" if log.encoding in ("utf-8", "utf-8-sig") else log.encoding,
+        "thousands": layout.thousands,
+        "skip": layout.skip,
+        "header": None if layout.header else False,
+        "units_row": layout.has_units_row or None,
+    }
+    return {key: value for key, value in found.items() if value or value is False}

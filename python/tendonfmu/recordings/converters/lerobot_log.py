@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
+import pyarrow.parquet as pq
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
@@ -29,7 +30,6 @@ V21, V30 = "v2.1", "v3.0"  # codebase_version
 TIME, EPISODE = "timestamp", "episode_index"
 COUNTERS = (EPISODE, "frame_index", "index", "task_index")  # features that every dataset has, and no signals
 GAP = 1.0, 20.0  # s and frames between two episodes, whichever is longer
-ROWS = 1 << 14  # of a batch; a file of version 3.0 holds up to 100 MB of episodes
 EFFORT = re.compile(r"effort|torque|current|force|load|tension|wrench|\btau")
 PLACE = ("data/chunk_index", "data/file_index")  # of an episode, version 3.0
 MOST = 10**9  # of numbers of episodes, files and rows
@@ -83,10 +83,10 @@ class LeRobotLog:
         """Read episode by episode; see `log.Log`."""
         places = {field.name: place for field, place in self._fields.items() if field.name in wanted.get("", ())}
         if len(self.episodes) > 1 and TIME not in places:
-            raise InputError(
-                f'{self.file}: several episodes in one recording, without their time; expected "time": {{"column": '
-                f'"{TIME}", "unit": "s"}} in the map, or one recording for each episode'
+            expected = (
+                f'expected "time": {{"column": "{TIME}", "unit": "s"}} in the map, or a recording for each episode'
             )
+            raise InputError(f"{self.file}: several episodes in one recording, without their time; {expected}")
         end = -np.inf
         for episode in self.episodes:
             rows = _rows_of(episode, {feature for feature, _ in places.values()})
@@ -195,9 +195,7 @@ def _rows(folder: Path) -> Iterator[tuple[str, Any]]:
     """Yield the place and content of each row of Parquet files."""
     files = sorted(folder.glob("*/*.parquet"))
     if not files:
-        raise InputError(
-            f"{folder}: no Parquet file; expected one with the episodes, which `finalize` of the package lerobot writes"
-        )
+        raise InputError(f"{folder}: no Parquet file; expected one with the episodes, as lerobot's `finalize` writes")
     for file in files:
         with opened(file) as parquet:
             try:  # without the statistics of the features
@@ -216,34 +214,19 @@ def _rows_of(episode: Episode, features: Collection[str]) -> Any:
     if not file.is_file():
         raise InputError(f"{file}: no such file; expected the data of episode {number}: copy the dataset again")
     with opened(file) as parquet:
-        wanted = sorted({EPISODE, *features})
-        for name in set(wanted) - set(parquet.schema_arrow.names):
-            raise InputError(
-                f"{file}: no column {name} of episode {number}, though {INFO} lists this feature; leave out the "
-                "episode (--episodes), or record it again"
-            )
-        groups = [k for k in range(parquet.num_row_groups) if _may_have(parquet.metadata.row_group(k), number)]
-        parts = [parquet.schema_arrow.empty_table().select(wanted)]
-        try:
-            for batch in parquet.iter_batches(ROWS, row_groups=groups, columns=wanted):
-                is_its = pc.equal(batch.column(EPISODE), number)
-                parts.append(pa.Table.from_batches([batch.filter(is_its)]).select(wanted))
-            table = pa.concat_tables(parts).combine_chunks()
-        except (pa.ArrowException, OSError) as error:
-            raise cut_off(file, error) from None
+        names = parquet.schema_arrow.names
+    for name in {EPISODE, *features} - {*names}:
+        missing = f"no column {name} of episode {number}, though {INFO} lists it"
+        raise InputError(f"{file}: {missing}; leave out the episode (--episodes), or record it again")
+    try:
+        is_its = pc.field(EPISODE) == number
+        table = pq.read_table(file, columns=sorted({EPISODE, *features}), filters=is_its, partitioning=None)
+    except (pa.ArrowException, OSError) as error:
+        raise cut_off(file, error) from None
     if table.num_rows != episode.length:
-        raise InputError(
-            f"{file}: {table.num_rows} rows of episode {number}; expected {episode.length}, as meta says: copy the "
-            "dataset again, or leave out the episode (--episodes)"
-        )
+        rows = f"{table.num_rows} rows of episode {number}; expected {episode.length}, as meta says"
+        raise InputError(f"{file}: {rows}: copy the dataset again, or leave out the episode (--episodes)")
     return table
-
-
-def _may_have(group: Any, number: int) -> bool:
-    """Return whether a row group may have rows of an episode, by its statistics."""
-    columns = [group.column(k) for k in range(group.num_columns)]
-    statistics = next((column.statistics for column in columns if column.path_in_schema == EPISODE), None)
-    return statistics is None or not statistics.has_min_max or statistics.min <= number <= statistics.max
 
 
 def _values(episode: Episode, rows: Any, feature: str, index: int) -> Any:

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, Protocol, cast
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
@@ -27,10 +28,10 @@ TEXTS = (".csv", ".txt", ".tsv", ".dat", ".log", ".lvm")
 FORMATS = {
     **dict.fromkeys(TEXTS, ("text_log", "TextLog")),
     ".parquet": ("parquet_log", "ParquetLog"),
-    ".mat": ("matlab_log", "open_matlab"),
-    **dict.fromkeys((".h5", ".hdf5", ".hdf"), ("hdf5_log", "open_hdf5")),
+    ".mat": ("array_log", "open_matlab"),
+    **dict.fromkeys((".h5", ".hdf5", ".hdf"), ("array_log", "open_hdf5")),
     **dict.fromkeys((".feather", ".arrow", ".jsonl", ".ndjson"), ("parquet_log", "TableLog")),
-    **dict.fromkeys((".npz", ".npy"), ("hdf5_log", "open_numpy")),
+    **dict.fromkeys((".npz", ".npy"), ("array_log", "open_numpy")),
     ".mcap": ("ros2_bag_log", "McapLog"),
     ".db3": ("ros2_bag_log", "open_bag"),
 }
@@ -51,21 +52,10 @@ Block = dict[str, Any]
 ROWS = 1 << 18  # of a block
 NUMBER, TIME, TEXT, OTHER = "number", "time", "text", "other"  # kinds of fields
 DATE_TIME = "date and time"  # type of a field that is made of two columns
-TIME_NAMES: tuple[str, ...] = (
-    "time",
-    "t",
-    "stamp",
-    "timestamp",
-    "time_s",
-    "time_ms",
-    "x_value",
-    "datetime",
-    "date_time",
-    "date/time",
-    "date time",
-    "header.stamp",
+TIME_NAMES = (
+    *("time", "t", "stamp", "timestamp", "time_s", "time_ms", "x_value", "datetime", "date_time", "date/time"),
+    *("date time", "header.stamp", "@log_time"),
 )
-TIME_NAMES += ("@log_time",)
 NUMBERED = "#"  # before the number of a column whose name is not unique
 NANOSECONDS = 10**9
 # ends of the names of both columns, which begin alike
@@ -144,10 +134,8 @@ def open_log(file: Path, settings: LogFormat) -> Log:
     if not file.is_dir():
         if suffix not in (TEXTS if is_gzip else FORMATS):
             advice = f"; {ELSEWHERE[suffix]}" if suffix in ELSEWHERE else ""
-            raise InputError(
-                f"{file}: unknown format {suffix!r}; expected {known}, texts also with .gz, or the folder of a bag "
-                f"or dataset{advice}"
-            )
+            expected = f"{known}, texts also with .gz, or the folder of a bag or dataset{advice}"
+            raise InputError(f"{file}: unknown format {suffix!r}; expected {expected}")
         if not file.is_file():
             raise InputError(f"{file}: no such file; expected a log, {known}")
     folder = DATASET if (file / INFO).is_file() else FOLDER
@@ -155,9 +143,7 @@ def open_log(file: Path, settings: LogFormat) -> Log:
     opener = getattr(importlib.import_module(f"tendonfmu.recordings.converters.{module}"), name)
     log = cast("Log", opener(file, settings))
     split = SplitStamps(log)
-    log = cast("Log", split) if split.topics != log.topics else log
-    rows = importlib.import_module("tendonfmu.recordings.converters.channel_rows")
-    return cast("Log", rows.by_channel(log))
+    return _by_channel(cast("Log", split) if split.topics != log.topics else log)
 
 
 def find_field(log: Log, source: str | int, where: str) -> tuple[Topic, str]:
@@ -166,9 +152,8 @@ def find_field(log: Log, source: str | int, where: str) -> tuple[Topic, str]:
         return _numbered(log, source, where)
     topics = [topic for topic in log.topics for field in topic.fields if field.name == source]
     if len(topics) > 1:
-        raise InputError(
-            f"{log.file}: column {source!r} of {where} occurs {len(topics)} times; expected once, or its number"
-        )
+        times = f"column {source!r} of {where} occurs {len(topics)} times"
+        raise InputError(f"{log.file}: {times}; expected once, or its number")
     if log.open_ended and not topics:
         by_length = sorted(log.topics, key=lambda topic: -len(topic.prefix))
         topics = [topic for topic in by_length if source.startswith(topic.prefix)]
@@ -180,9 +165,8 @@ def find_field(log: Log, source: str | int, where: str) -> tuple[Topic, str]:
 
 def _numbered(log: Log, number: int, where: str) -> tuple[Topic, str]:
     if len(log.topics) != 1:
-        raise InputError(
-            f"{where}.column = {number}: {log.file} has {counted(len(log.topics), 'topic')}; expected a name"
-        )
+        has = f"{log.file} has {counted(len(log.topics), 'topic')}"
+        raise InputError(f"{where}.column = {number}: {has}; expected a name")
     names = [field.name for field in log.topics[0].fields]
     if number > len(names):
         raise InputError(f"{where}.column = {number}: {log.file} has {counted(len(names), 'column')}")
@@ -270,3 +254,91 @@ class SplitStamps:
             k = int(np.argmax(wrong))
             raise InputError(f"{self.file}: column {name}, row {row + k + 1}: {numbers[k]}; expected a part of a time")
         return numbers.astype(np.int64)
+
+
+# --- logs with one value a row, whose channel a text names, as databases export them ----------------------------------
+
+MOST, FEWEST = 200, 20  # channels; rows of a channel
+CLOCK = "time"  # of each channel, after its name
+VALUES = ("value", "val", "data")  # names of the values, where there are other numbers
+
+
+def _by_channel(log: Log) -> Log:
+    """Return the log with a topic for each channel if each of its rows is one value of one of them."""
+    if len(log.topics) != 1 or log.open_ended:
+        return log
+    topic = log.topics[0]
+    numbers = [field.name for field in topic.fields if field.kind == NUMBER]
+    texts = [field.name for field in topic.fields if field.kind == TEXT]
+    clock = next(iter(topic.clocks()), None)
+    values = [name for name in numbers if name != clock]
+    if len(values) > 1:
+        values = [name for name in values if name.strip("_").lower() in VALUES]
+    if clock is None or len(values) != 1 or not set(texts) - {clock}:
+        return log
+    rows = list(log.blocks({topic.name: [clock, *texts]}, texts))
+    names = {name: _texts([block[name] for _, block in rows]) for name in texts if name != clock}
+    several = [name for name, each in names.items() if pc.count_distinct(each).as_py() > 1]
+    if len(several) != 1:
+        return log
+    channel, times = names[several[0]], np.concatenate([np.asarray(block[clock]) for _, block in rows])
+    counts = {entry["values"]: entry["counts"] for entry in pc.value_counts(channel).to_pylist()}
+    if None in counts or len(counts) > MOST or min(counts.values()) < FEWEST:
+        return log
+    # times of samples rise from row to row; those of values from one of a channel to the next
+    if _rise(times) or not all(_rise(times[np.asarray(pc.equal(channel, name))]) for name in counts):
+        return log
+    return cast("Log", ChannelRows(log, (clock, several[0], values[0]), counts))
+
+
+def _texts(blocks: Sequence[Any]) -> Any:
+    return pa.chunked_array([pa.array(block, pa.string()) for block in blocks])
+
+
+def _rise(times: NDArray[Any]) -> bool:
+    return bool(np.all(times[1:] > times[:-1]))
+
+
+class ChannelRows:
+    """A log with one topic for each channel, of its times and its values."""
+
+    open_ended = False
+
+    def __init__(self, log: Log, columns: tuple[str, str, str], counts: Mapping[str, int]) -> None:
+        """Take the log, its columns of times, of names and of values, and the rows of each channel."""
+        self.log, self.file = log, log.file
+        self._clock, self._name, self._value = columns
+        fields = {field.name: field for field in log.topics[0].fields}
+        self.topics = [
+            Topic(
+                channel,
+                (
+                    replace(fields[self._clock], name=f"{channel}.{CLOCK}"),
+                    replace(fields[self._value], name=channel),
+                ),
+                count,
+                f"{channel}.",
+            )
+            for channel, count in counts.items()
+        ]
+
+    @property
+    def notes(self) -> list[str]:
+        """What was recovered or left out, one sentence each."""
+        channels = counted(len(self.topics), "channel")
+        return [f"{self.file}: one value a row: {self._name} names {channels} of {self._value}", *self.log.notes]
+
+    def blocks(self, wanted: Mapping[str, Sequence[str]], texts: Sequence[str] = ()) -> Iterator[tuple[str, Block]]:
+        """Read fields, as every log does."""
+        is_text = any(name.endswith(f".{CLOCK}") for name in texts)
+        columns = [self._clock, self._name, self._value]
+        topic = self.log.topics[0].name
+        for _, block in self.log.blocks({topic: columns}, [self._name, *[self._clock] * is_text]):
+            for channel, names in wanted.items():
+                rows = np.asarray(pc.equal(block[self._name], channel))
+                picked = {
+                    f"{channel}.{CLOCK}": block[self._clock].filter(rows) if is_text else block[self._clock][rows],
+                    channel: block[self._value][rows],
+                }
+                if rows.any():
+                    yield channel, {name: picked[name] for name in names}

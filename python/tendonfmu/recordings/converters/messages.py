@@ -71,9 +71,8 @@ class MessageLog(ABC):
         self.topics = _topics_of(self._messages())
         if not self.topics:
             reasons = "; ".join([*self.unknown.values(), *self.notes])
-            raise InputError(
-                f"{file}: no messages that can be read{f' ({reasons})' if reasons else ''}; expected at least one"
-            )
+            why = f" ({reasons})" if reasons else ""
+            raise InputError(f"{file}: no messages that can be read{why}; expected at least one")
         self.notes.clear()
 
     @abstractmethod

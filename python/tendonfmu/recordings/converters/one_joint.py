@@ -119,10 +119,8 @@ def _cutoff(file: Path, time: Numbers, wanted: float | None) -> float:
     if wanted is None:
         return min(CUTOFF, SHARE_OF_RATE * rate)
     if wanted > SHARE_OF_RATE * rate:
-        raise InputError(
-            f"{file}: {rate:g} samples per second; joint.velocity_cutoff = {wanted:g}: "
-            f"expected at most {SHARE_OF_RATE * rate:g} Hz, or 0 for none"
-        )
+        most = f"at most {SHARE_OF_RATE * rate:g} Hz at {rate:g} samples per second, or 0 for none"
+        raise InputError(f"{file}: joint.velocity_cutoff = {wanted:g}: expected {most}")
     return wanted
 
 
@@ -133,9 +131,7 @@ def describe_joint(log: ConvertedLog) -> dict[str, Any]:
     """Make the finger description of the machine in a log."""
     joint = log.map.joint
     if joint is None:
-        raise InputError(
-            f'{log.map.path}: joint: missing; expected "joint" instead of "columns" where --finger is to be written'
-        )
+        raise InputError(f'{log.map.path}: joint: missing; --finger needs "joint" instead of "columns"')
     return _measured(joint.name, log.columns, log.velocity_cutoff or CUTOFF, 1.0)
 
 

@@ -33,8 +33,8 @@ from tendonfmu.recordings.converters.log import (
 )
 
 
-class ArrowLog:
-    """A log that Arrow reads as batches of a table."""
+class ParquetLog:
+    """A log that Arrow reads as batches of a table: Parquet."""
 
     open_ended = False
 
@@ -90,17 +90,12 @@ class ArrowLog:
             try:
                 column = pc.struct_field(column, step) if isinstance(step, str) else pc.list_element(column, step)
             except pa.ArrowException:
-                raise InputError(
-                    f"{self.file}: column {name}, rows from {row + 1} on: fewer elements than in the first row"
-                ) from None
+                rows = f"rows from {row + 1} on: fewer elements than in the first row"
+                raise InputError(f"{self.file}: column {name}, {rows}") from None
         return column
 
 
-class ParquetLog(ArrowLog):
-    """A Parquet log."""
-
-
-class TableLog(ArrowLog):
+class TableLog(ParquetLog):
     """A log that is read at once: Feather, or a JSON document in each line."""
 
     def _begin(self) -> tuple[Any, int, Any]:
@@ -111,9 +106,8 @@ class TableLog(ArrowLog):
                 table = json.read_json(self.file)
         except (pa.ArrowException, OSError) as error:
             reason = str(error).splitlines()[0]
-            raise InputError(
-                f"{self.file}: {reason}; expected a table of Arrow, or a JSON object in each line"
-            ) from None
+            expected = "a table of Arrow, or a JSON object in each line"
+            raise InputError(f"{self.file}: {reason}; expected {expected}") from None
         self._table = table.combine_chunks()
         return table.schema, table.num_rows, self._table.slice(0, 1)
 
@@ -155,10 +149,8 @@ def cut_off(file: Path, error: Exception) -> Exception:
     """Return the error of a file that cannot be read."""
     if is_without_memory(error):
         return error
-    return InputError(
-        f"{file}: not a whole Parquet file ({str(error).splitlines()[0]}); its index is at its end, so "
-        "nothing can be recovered: copy the file again, or write it again from its source"
-    )
+    reason = str(error).splitlines()[0]
+    return InputError(f"{file}: not a whole Parquet file ({reason}); nothing can be recovered: copy or write it again")
 
 
 def values_of(file: Path, name: str, column: Any, row: int) -> Any:

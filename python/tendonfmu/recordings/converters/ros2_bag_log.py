@@ -47,9 +47,8 @@ class McapLog(MessageLog):
         schemas: dict[int, Any] = {}
         channels: dict[int, tuple[str, Decoder | None]] = {}
         types = Ros2Types(self.file)
-        records = McapRecords(part)
-        kept = 0
-        for record in records:
+        kept, self._cut = 0, ""  # why the file ends early
+        for record in self._records(part):
             kind = type(record).__name__
             if kind == "Schema":
                 schemas[record.id] = record
@@ -61,8 +60,8 @@ class McapLog(MessageLog):
                 topic, decode = channels.get(record.channel_id, ("", None))
                 if decode is not None:
                     yield Received(topic, record.log_time, record.publish_time, decode, record.data)
-        if records.cut:
-            self.notes.append(f"{part}: {records.cut}; {counted(kept, 'message')} {are(kept)} kept")
+        if self._cut:
+            self.notes.append(f"{part}: {self._cut}; {counted(kept, 'message')} {are(kept)} kept")
 
     def _decoder(self, channel: Any, schema: Any, types: Ros2Types) -> Decoder | None:
         encoding = channel.message_encoding
@@ -77,28 +76,13 @@ class McapLog(MessageLog):
         self.unknown[channel.topic] = f"{channel.topic}: messages in {encoding!r}"
         return None
 
-
-def _decode_protobuf(decode: Decoder, data: bytes) -> Any:
-    try:
-        return decode(data)
-    except Exception as error:  # google.protobuf has errors of its own
-        raise ValueError(str(error)) from None
-
-
-class McapRecords:
-    """The schemas, channels and messages of an MCAP file in its order, also of one that was cut off."""
-
-    def __init__(self, file: Path) -> None:
-        self.file = file
-        self.cut = ""  # why the file ends early
-
-    def __iter__(self) -> Iterator[Any]:
-        """Yield records of the package mcap: Schema, Channel and Message."""
+    def _records(self, part: Path) -> Iterator[Any]:
+        """Yield the schemas, channels and messages (of the package mcap) of a file, also of one that was cut off."""
         stream = require_extra("mcap.stream_reader", str(self.file))
         errors = require_extra("mcap.exceptions", str(self.file))
-        with open(self.file, "rb") as raw:
+        with open(part, "rb") as raw:
             if raw.read(len(MAGIC)) != MAGIC:
-                raise InputError(f"{self.file}: not an MCAP file; expected one that begins with its mark")
+                raise InputError(f"{part}: not an MCAP file; expected one that begins with its mark")
             reader = stream.StreamReader(raw, skip_magic=True, emit_chunks=True, record_size_limit=LARGEST)
             at = raw.tell()
             try:
@@ -112,16 +96,23 @@ class McapRecords:
                     elif kind in RECORDS:
                         yield record
             except errors.UnsupportedCompressionError as error:
-                raise InputError(f"{self.file}: {error}; expected compression by zstd, lz4 or none") from None
+                raise InputError(f"{part}: {error}; expected compression by zstd, lz4 or none") from None
             except errors.EndOfFile:
-                self.cut = "the file is cut off"
+                self._cut = "the file is cut off"
                 raw.seek(at)
                 with suppress(Exception):  # of what is left of the last chunk, all errors mean its end
                     for record in stream.StreamReader(_begin_of_chunk(raw.read()), skip_magic=True).records:
                         if type(record).__name__ in RECORDS:
                             yield record
             except Exception as error:  # of zstd, lz4, checksums and records
-                self.cut = f"a block is damaged ({error})"
+                self._cut = f"a block is damaged ({error})"
+
+
+def _decode_protobuf(decode: Decoder, data: bytes) -> Any:
+    try:
+        return decode(data)
+    except Exception as error:  # google.protobuf has errors of its own
+        raise ValueError(str(error)) from None
 
 
 def _begin_of_chunk(record: bytes) -> io.BytesIO:
@@ -171,10 +162,8 @@ class Db3Log(MessageLog):
                 # by row: the index of times may lie in a part that is lost
                 rows = connection.execute("SELECT topic_id, timestamp, data FROM messages NOT INDEXED ORDER BY id")
             except sqlite3.DatabaseError as error:
-                raise InputError(
-                    f"{part}: not a ROS 2 bag that SQLite can read ({error}); copy the file again, or try "
-                    "`sqlite3 FILE .recover`"
-                ) from None
+                advice = "copy the file again, or try `sqlite3 FILE .recover`"
+                raise InputError(f"{part}: not a ROS 2 bag that SQLite can read ({error}); {advice}") from None
             while True:
                 try:
                     row = rows.fetchone()

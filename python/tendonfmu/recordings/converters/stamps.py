@@ -22,18 +22,10 @@ from tendonfmu.recordings.converters.units import STAMPS
 NANOSECONDS = 10**9
 LATEST = 2**62  # ns; the year 2116
 DAY = 86400 * NANOSECONDS
-DATES: tuple[str, ...] = (
-    "%Y-%m-%d",
-    "%Y/%m/%d",
-    "%Y.%m.%d",
-    "%d.%m.%Y",
-    "%d/%m/%Y",
-    "%m/%d/%Y",
-    "%d-%m-%Y",
-    "%m-%d-%Y",
-    "%d.%m.%y",
+DATES = (
+    *("%Y-%m-%d", "%Y/%m/%d", "%Y.%m.%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y", "%m-%d-%Y", "%d.%m.%y"),
+    *("%d/%m/%y", "%m/%d/%y", "%d-%b-%Y", "%d %b %Y", "%b %d, %Y", "%Y%m%d", "0 days"),
 )
-DATES += ("%d/%m/%y", "%m/%d/%y", "%d-%b-%Y", "%d %b %Y", "%b %d, %Y", "%Y%m%d", "0 days")
 PATTERNS = [
     f"{date}{hour}"
     for date in ("", *(f"{date} " for date in DATES), *(f"{date}T" for date in DATES))
@@ -59,8 +51,7 @@ def nanoseconds(file: Path, column: MappedColumn, readings: Any, row: int = 0) -
         stamps = None
     if stamps is not None:
         return stamps
-    read = _by_digits if column.stamp != "datetime" else _by_pattern if column.pattern else _by_iso
-    return np.array([read(file, column, text or "", row + k) for k, text in enumerate(texts.to_pylist())], np.int64)
+    return np.array([_alone(file, column, text or "", row + k) for k, text in enumerate(texts.to_pylist())], np.int64)
 
 
 def pattern_of(texts: Sequence[str]) -> str:
@@ -125,38 +116,33 @@ def _at_once(column: MappedColumn, texts: Any) -> Stamps | None:
     return np.asarray(local.cast(pa.int64()).to_numpy())
 
 
-def _by_digits(file: Path, column: MappedColumn, text: str, row: int) -> int:
-    """Return the stamp of a text of digits, exact to the nanosecond."""
+def _alone(file: Path, column: MappedColumn, text: str, row: int) -> int:
+    """Return the stamp of a text, exact to the nanosecond."""
+    expected = f'a time as in 2026-05-01T12:00:00.5Z, or a "pattern" at {column.path}'
     try:
-        value = Decimal(text.replace(",", ".")) * STAMPS[column.stamp]
-        if abs(value) <= LATEST:  # NaN raises InvalidOperation
+        if column.stamp != "datetime":
+            expected = f"a time in {column.stamp}"
+            value = Decimal(text.replace(",", ".")) * STAMPS[column.stamp]
+            if abs(value) > LATEST:  # NaN raises InvalidOperation
+                raise ValueError(text)
             return int(value.to_integral_value())
-    except InvalidOperation:
-        pass
-    raise _refused(file, column, row, text, f"a time in {column.stamp}")
+        if column.pattern:
+            expected = f"a time like {column.pattern}, the pattern at {column.path}"
+            return _moment(text, column.pattern, column.zone)
+        return _by_iso(text, column.zone)
+    except (ValueError, InvalidOperation):
+        raise _refused(file, column, row, text, expected) from None
 
 
-def _by_iso(file: Path, column: MappedColumn, text: str, row: int) -> int:
-    try:
-        if text[-1:].isdigit() and "+" not in text and text.count("-") <= 2:
-            moment = int(pa.scalar(text).cast(pa.timestamp("ns")).value)
-            if column.zone == "UTC":
-                return moment
-            local = datetime.datetime.fromtimestamp(moment // NANOSECONDS, datetime.timezone.utc)
-            seconds = int(local.replace(tzinfo=zoneinfo.ZoneInfo(column.zone)).timestamp())
-            return seconds * NANOSECONDS + moment % NANOSECONDS
+def _by_iso(text: str, zone: str) -> int:
+    if not (text[-1:].isdigit() and "+" not in text and text.count("-") <= 2):
         return int(pa.scalar(text).cast(pa.timestamp("ns", "UTC")).value)
-    except pa.ArrowInvalid:
-        expected = f'a time as in 2026-05-01T12:00:00.5Z, or a "pattern" at {column.path}'
-        raise _refused(file, column, row, text, expected) from None
-
-
-def _by_pattern(file: Path, column: MappedColumn, text: str, row: int) -> int:
-    try:
-        return _moment(text, column.pattern, column.zone)
-    except ValueError:
-        expected = f"a time like {column.pattern}, the pattern at {column.path}"
-        raise _refused(file, column, row, text, expected) from None
+    moment = int(pa.scalar(text).cast(pa.timestamp("ns")).value)
+    if zone == "UTC":
+        return moment
+    local = datetime.datetime.fromtimestamp(moment // NANOSECONDS, datetime.timezone.utc)
+    seconds = int(local.replace(tzinfo=zoneinfo.ZoneInfo(zone)).timestamp())
+    return seconds * NANOSECONDS + moment % NANOSECONDS
 
 
 def _moment(text: str, pattern: str, zone: str) -> int:

@@ -23,8 +23,8 @@ from tendonfmu.recordings.converters.column_map import ColumnMap, ConvertedLog, 
 from tendonfmu.recordings.converters.log import TIME_NAMES, Log, Topic, find_field, open_log
 from tendonfmu.recordings.converters.one_joint import joint_columns
 from tendonfmu.recordings.converters.stamps import DAY, nanoseconds, of_day_alone
-from tendonfmu.recordings.counters import overflow, unwrapped
 from tendonfmu.recordings.recording import LABEL
+from tendonfmu.recordings.traps import overflow, unwrapped
 
 GAP = 10.0  # median steps; a longer one is a gap unless the map says otherwise
 
@@ -76,7 +76,7 @@ class Conversion:
             raise InputError(f"{self.map.path}: columns.time.rate: {file} has several topics; expected their clocks")
         self._clocks = {name: self._clock_of(topic) for name, topic in self._topics.items()}
         is_simple = len(self._names) == 1 and self.map.joint is None
-        self.in_blocks = is_simple and self.map.resample is None and not self.map.log.sort
+        self.in_blocks = is_simple and self.map.resample is None and self.map.log.disorder != "sort"
 
     def _clock_of(self, topic: Topic) -> MappedColumn:
         """Return the time of a topic: the column `time`, that of the map, or the field of the same name."""
@@ -86,15 +86,12 @@ class Conversion:
         clock = self.map.log.clocks.get(topic.name) or self._same_clock(topic, time)
         owner, source = find_field(self.log, clock.source, f"{self.map.path}: {clock.path}")
         if owner.name != topic.name:
-            raise InputError(
-                f"{self.map.path}: {clock.path}.column = {clock.source!r}: a field of {owner.name}; "
-                f"expected one of {topic.name}"
-            )
+            given = f"{clock.path}.column = {clock.source!r}: a field of {owner.name}"
+            raise InputError(f"{self.map.path}: {given}; expected one of {topic.name}")
         if bool(clock.stamp) != bool(time.stamp):
-            raise InputError(
-                f'{self.map.path}: {clock.path}: a clock of another kind than {time.path}; expected "unit": '
-                '"datetime" or epoch_... for both, or for none'
-            )
+            expected = '"unit": "datetime" or epoch_... for both, or for none'
+            other = f"a clock of another kind than {time.path}"
+            raise InputError(f"{self.map.path}: {clock.path}: {other}; expected {expected}")
         self._names[topic.name]["time"] = source
         return clock
 
@@ -131,7 +128,7 @@ class Conversion:
         for topic, names in self._names.items():
             keys = ["time", *names] if self._is_counted else names
             columns = {key: self._clocks[topic] if key == "time" else self.map.columns[key] for key in keys}
-            readers[topic] = TopicRows(self.log.file, columns, names, self.map.log.leave_out_missing)
+            readers[topic] = TopicRows(self.log.file, columns, names, self.map.log.leaves_out)
         self._readers_used = list(readers.values())
         return readers
 
@@ -143,9 +140,8 @@ class Conversion:
             yield topic, readers[topic].rows(block)
         for topic, reader in readers.items():
             if not reader.count:
-                raise InputError(
-                    f"{self.log.file}: no samples{f' of {topic}' if topic else ''}; expected at least one row"
-                )
+                of_topic = f" of {topic}" if topic else ""
+                raise InputError(f"{self.log.file}: no samples{of_topic}; expected at least one row")
             if reader.left_out:
                 out = reader.left_out
                 self.notes.append(f"{self.log.file}: {counted(out, 'row')} without a number {are(out)} left out")
@@ -167,7 +163,7 @@ class Conversion:
         ordered = {}
         for topic, reader in readers.items():
             ordered[topic] = Rows.joined(parts[topic])
-            if self.map.log.sort:
+            if self.map.log.disorder == "sort":
                 ordered[topic] = _sorted(self.log.file, ordered[topic], self._clocks[topic], self.notes)
             else:
                 reader.check_time(ordered[topic])
@@ -220,9 +216,8 @@ class TopicRows:
         self._fastest: dict[str, float] = {}  # and its largest step
 
     def _refused(self, key: str, row: int, reading: str, expected: str) -> InputError:
-        return InputError(
-            f"{self._file}: column {self._columns[key].source}, row {row}: {reading}; expected {expected}"
-        )
+        where = f"{self._file}: column {self._columns[key].source}, row {row}"
+        return InputError(f"{where}: {reading}; expected {expected}")
 
     def rows(self, block: Mapping[str, Any]) -> Rows:
         """Take a block of the log. Raise InputError for what is no number."""
@@ -288,10 +283,8 @@ class TopicRows:
         for key, step in self._fastest.items():
             column = self._columns[key]
             if step > FASTEST_TURN * column.wrap:
-                yield (
-                    f"{self._file}: warning: {column.path}: moves by up to {step:.4g} of the {column.wrap:g} readings "
-                    "of a turn from row to row; turns may be lost"
-                )
+                moves = f"moves by up to {step:.4g} of the {column.wrap:g} readings of a turn from row to row"
+                yield f"{self._file}: warning: {column.path}: {moves}; turns may be lost"
 
     def check_time(self, rows: Rows) -> None:
         """Check that time increases, from block to block too. Raise InputError."""
@@ -423,12 +416,10 @@ def _gaps(place: str, clock: Numbers, time: Numbers, rule: Resampling, notes: li
     around = np.where(clock[after] == time, 0.0, steps[after])  # a sample of the topic itself lies in no gap
     around[time == clock[-1]] = 0.0
     gaps = np.asarray(around > limit)
-    if gaps.any() and not rule.leave_out_gaps:
+    if gaps.any() and rule.gaps != "leave out":
         at, largest = float(time[int(np.argmax(gaps))]), float(around.max(initial=0.0))
-        raise InputError(
-            f"{place}a gap of {largest:.4g} s, the first near time {at:.6g} s; expected at most "
-            f'{limit:.4g} s, or "resample": {{"gaps": "leave out"}} or a "largest_gap" in the map'
-        )
+        gap = f"a gap of {largest:.4g} s, the first near time {at:.6g} s; expected at most {limit:.4g} s"
+        raise InputError(f'{place}{gap}, or "resample": {{"gaps": "leave out"}} or a "largest_gap" in the map')
     return gaps
 
 

@@ -134,39 +134,32 @@ def _uncommented(line: str) -> str:
 
 def find_layout(file: Path, lines: list[str], log: LogFormat) -> Layout:
     """Return how a log is written. Raise InputError if no column has numbers, or names and rows do not fit."""
-    ends = [k for k, line in enumerate(lines) if line.startswith(END_OF_HEADER)][:2]  # of the file, and of its channels
-    given = log.skip if log.skip is not None else ends[-1] + 1 if ends else 0
-    content = [(k, line) for k, line in enumerate(lines) if k >= given and line.strip()]
-    if not content:
-        raise InputError(f"{file}: no line after the {given} that the map skips; expected a line of names")
-    plain = [line for _, line in content if not is_comment(line)] or [line for _, line in content]
-    separator = log.separator or _separator(plain, log.decimal)
-    rows = [(k, fields_of(line, separator)) for k, line in content if not is_comment(line)]
-    last = [row for _, row in rows[-LAST:]]
-    decimal = log.decimal or _decimal(last)
-    thousands = log.thousands if log.thousands is not None else _thousands(last, decimal)
-    labels = next((fields_of(line, separator)[1:] for line in lines if line.startswith("Y_Unit_Label")), [])
-    found = _Lines(file, content, rows, separator, decimal, thousands, labels, log)
-    return found.layout(given)
+    return _Lines(file, lines, log).layout()
 
 
-@dataclass
 class _Lines:
     """The first lines of a log."""
 
-    file: Path
-    content: list[tuple[int, str]]  # their numbers, and those that are not empty
-    rows: list[tuple[int, list[str]]]  # the cells of those that are no comments
-    separator: str
-    decimal: str
-    thousands: str
-    labels: list[str]  # units of the channels in the header of LabVIEW
-    log: LogFormat
-
-    def __post_init__(self) -> None:
-        last = self.rows[-LAST:]
-        self.width = Counter(len(row) for _, row in last).most_common(1)[0][0] if last else 0
-        self.even = [row for _, row in last if len(row) == self.width]
+    def __init__(self, file: Path, lines: list[str], log: LogFormat) -> None:
+        self.file, self.log = file, log
+        ends = [k for k, line in enumerate(lines) if line.startswith(END_OF_HEADER)][:2]  # of the file, and of channels
+        self.given = log.skip if log.skip is not None else ends[-1] + 1 if ends else 0
+        # their numbers, and those that are not empty
+        self.content = [(k, line) for k, line in enumerate(lines) if k >= self.given and line.strip()]
+        if not self.content:
+            raise InputError(f"{file}: no line after the {self.given} that the map skips; expected a line of names")
+        plain = [line for _, line in self.content if not is_comment(line)] or [line for _, line in self.content]
+        self.separator = log.separator or _separator(plain, log.decimal)
+        # the cells of those that are no comments
+        self.rows = [(k, fields_of(line, self.separator)) for k, line in self.content if not is_comment(line)]
+        last = [row for _, row in self.rows[-LAST:]]
+        self.decimal = log.decimal or _decimal(last)
+        self.thousands = log.thousands if log.thousands is not None else _thousands(last, self.decimal)
+        # units of the channels in the header of LabVIEW
+        of_channels = (line for line in lines if line.startswith("Y_Unit_Label"))
+        self.labels = next((fields_of(line, self.separator)[1:] for line in of_channels), [])
+        self.width = Counter(map(len, last)).most_common(1)[0][0] if last else 0
+        self.even = [row for row in last if len(row) == self.width]
         # columns with numbers in most of the last lines
         counts = [sum(self.is_number(row[k]) for row in self.even) for k in range(self.width)]
         self.numeric = [k for k, count in enumerate(counts) if count and 2 * count >= max(counts)]
@@ -179,7 +172,7 @@ class _Lines:
         cells = [row[k] for k in self.numeric] if len(row) == self.width else []
         return any(map(self.is_number, cells)) and all(is_value(cell, self.decimal, self.thousands) for cell in cells)
 
-    def layout(self, given: int) -> Layout:
+    def layout(self) -> Layout:
         first = next((k for k, row in self.rows if self.is_row(row)), None)
         if first is None and not self.numeric:
             self.refuse_texts()
@@ -189,7 +182,7 @@ class _Lines:
         if at is None:
             self.refuse_other_names(first or 0)
             start = first if first is not None and self.log.skip is None else (self.rows or self.content)[0][0]
-            names, number = [str(i) for i in range(1, self.width + 1)], start if self.log.skip is None else given
+            names, number = [str(i) for i in range(1, self.width + 1)], start if self.log.skip is None else self.given
         else:
             number, line = self.content[at]
             names = self.fitted(fields_of(_uncommented(line), self.separator))
@@ -285,10 +278,8 @@ class _Lines:
         """Raise InputError if the line above the rows has half as many names as they have fields."""
         names = next((row for k, row in reversed(self.rows) if k < first), [])
         if self.separator == "," and len(names) > 1 and len(names) * 2 == self.width:
-            raise InputError(
-                f"{self.file}: {len(names)} names and {self.width} fields in a row between commas, as of numbers with "
-                "decimal commas; write the log with ; between its fields, or with decimal points"
-            )
+            given = f"{len(names)} names and {self.width} fields in a row between commas, as of decimal commas"
+            raise InputError(f"{self.file}: {given}; write ; between the fields, or decimal points")
 
     def refuse_texts(self) -> None:
         """Raise InputError: no column has numbers."""
@@ -301,10 +292,8 @@ class _Lines:
             advice = "name a file with a JSON object in each line .jsonl"
         if len(self.content) == 1 and not pairs:
             return  # a line of names without rows
-        raise InputError(
-            f"{self.file}: no column has numbers in the first {counted(len(self.content), 'line')}, such as "
-            f"{line.strip()[:60]!r}; {advice}"
-        )
+        lines = f"the first {counted(len(self.content), 'line')}, such as {line.strip()[:60]!r}"
+        raise InputError(f"{self.file}: no column has numbers in {lines}; {advice}")
 
 
 def _separator(lines: list[str], decimal: str | None) -> str:

@@ -137,7 +137,7 @@ class TextLog:
         if self._stamps:
             head = [with_column_of_stamps(line, self._stamps) for line in head]
         self.layout = find_layout(file, head[: (settings.skip or 0) + SAMPLE], settings)
-        self._is_lenient = settings.leave_out_missing
+        self._is_lenient = settings.leaves_out
         lines = [line for line in head[self.layout.start :] if line.strip()]
         self._places: list[tuple[int, int | None]] = []  # of each field: its column, and which number of a list there
         self.topics = _pairs(list(self._fields(lines[:SAMPLE])))
@@ -232,9 +232,8 @@ class TextLog:
         try:
             return str(decoder.decode(chunk))
         except UnicodeDecodeError as error:
-            raise InputError(
-                f'{self.file}: not a text file in {self.encoding} ({error.reason}); set "encoding" in "log" of the map'
-            ) from None
+            given = f"not a text file in {self.encoding} ({error.reason})"
+            raise InputError(f'{self.file}: {given}; set "encoding" in "log" of the map') from None
 
     # --- rows ---------------------------------------------------------------------------------------------------------
 
@@ -378,10 +377,8 @@ class TextLog:
         if len(fields) == layout.width + 1 and not fields[-1]:
             fields.pop()  # some rows end in a separator
         if len(fields) != layout.width:
-            return (
-                f"\0{counted(len(fields), 'field')} between {layout.separator!r}; expected {layout.width}, as in the "
-                'first line, or "missing": "leave out" in "log" of the map'
-            )
+            given = f"{counted(len(fields), 'field')} between {layout.separator!r}"
+            return f'\0{given}; expected {layout.width}, or "missing": "leave out" in "log" of the map'
         cells: list[Any] = []
         for name, (place, number) in places.items():
             cell = fields[place]

@@ -1,19 +1,22 @@
-"""How HDF5 files are read, and what they have in common with those of MATLAB and numpy: arrays with names.
+"""How files of arrays with names are read: HDF5, numpy, and MATLAB (v5 to v7.2 by scipy, v7.3, which is HDF5, by h5py).
 
 Arrays of one struct or group are a topic. A row is an element along the longer side of an array; the columns of a
-matrix are fields `name[1]`, `name[2]`, ... Datasets are named by path, `/group/force` or `/group/force[2]`, and fields
-of compound datasets by a dot. A file that is cut off is refused: HDF5 finds its data by tables that may lie anywhere.
+matrix are fields `name[1]`, `name[2]`, ... Datasets are named by path, `/group/force` or `/group/force[2]`, fields of
+compound datasets by a dot; in MATLAB a field of a struct is `data.force`, an element of an array of structs
+`out.signals[1].values`. A file that is cut off is refused: HDF5 finds its data by tables that may lie anywhere.
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy import io
 
 from tendonfmu.errors import InputError
 from tendonfmu.files import counted, require_extra
@@ -47,8 +50,9 @@ class Array:
     def of(cls, topic: str, name: str, values: Any, by_columns: bool, unit: str = "") -> Array:
         """Return the array of an array or dataset. by_columns: the columns of a matrix are the rows."""
         shape = (values.shape[1], values.shape[0]) if by_columns else values.shape
-        read = partial(_read_columns if by_columns else _read_rows, values)
-        return cls(topic, name, shape, values.dtype, read, unit)
+        if by_columns:
+            return cls(topic, name, shape, values.dtype, lambda start, stop: np.asarray(values[:, start:stop]).T, unit)
+        return cls(topic, name, shape, values.dtype, lambda start, stop: values[start:stop], unit)
 
     def fields(self) -> Iterator[tuple[Field, int]]:
         """Yield the fields, each with the column that it is."""
@@ -63,12 +67,9 @@ class Array:
             yield Field(self.name, OTHER, f"{self.dtype} {sizes}", self.unit), 0
 
 
-def _read_rows(values: Any, start: int, stop: int) -> Any:
-    return values[start:stop]
-
-
-def _read_columns(values: Any, start: int, stop: int) -> Any:
-    return np.asarray(values[:, start:stop]).T
+def _rows_of(values: Any, part: Callable[[Any], Any]) -> Callable[[int, int], Any]:
+    """Return a function that reads rows (start, stop) of an array, and of these a part."""
+    return lambda start, stop: part(values[start:stop])
 
 
 class ArraysLog:
@@ -115,9 +116,7 @@ class ArraysLog:
         try:
             rows = np.asarray(array.read(start, min(start + ROWS, array.shape[0])))
         except (OSError, ValueError) as error:
-            raise InputError(
-                f"{self.file}: {name}: cannot be read ({error}); the file is damaged: copy it again, or write it again"
-            ) from None
+            raise InputError(f"{self.file}: {name}: cannot be read ({error}); copy or write the file again") from None
         values = rows.reshape(len(rows), -1)[:, column] if rows.ndim > 1 else rows
         if values.dtype.kind in "SUO":
             texts = [text.decode("utf-8", "replace") if isinstance(text, bytes) else text for text in values.tolist()]
@@ -152,7 +151,7 @@ def _sampled_together(arrays: Sequence[Array]) -> Iterator[list[Array]]:
 
 def open_hdf5(file: Path, settings: LogFormat) -> ArraysLog:
     """Open an HDF5 file. Raise InputError."""
-    h5 = open_file(file)
+    h5 = _open_hdf5(file)
     arrays: list[Array] = []
 
     def add(name: str, node: Any) -> None:
@@ -164,7 +163,7 @@ def open_hdf5(file: Path, settings: LogFormat) -> ArraysLog:
     try:
         h5.visititems(add)
     except (OSError, RuntimeError, KeyError, ValueError) as error:
-        raise damaged(file, error) from None
+        raise _damaged(file, error) from None
     return ArraysLog(file, arrays, [])
 
 
@@ -178,22 +177,19 @@ def open_numpy(file: Path, settings: LogFormat) -> ArraysLog:
     return ArraysLog(file, [part for name, array in values.items() for part in _arrays(name, array)], [])
 
 
-def open_file(file: Path) -> Any:
+def _open_hdf5(file: Path) -> Any:
     """Open a file with h5py. Raise InputError."""
     h5py = require_extra("h5py", str(file))
     try:
         return h5py.File(file, "r")
     except (OSError, RuntimeError, KeyError, ValueError) as error:
-        raise damaged(file, error) from None
+        raise _damaged(file, error) from None
 
 
-def damaged(file: Path, error: Exception) -> InputError:
+def _damaged(file: Path, error: Exception) -> InputError:
     """Return the refusal of a file that HDF5 cannot read."""
     reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-    return InputError(
-        f"{file}: not a whole HDF5 file ({reason}); nothing can be recovered: copy the file again, close it "
-        "properly in the logger, or write it again from its source"
-    )
+    return InputError(f"{file}: not a whole HDF5 file ({reason}); nothing can be recovered: copy or write it again")
 
 
 def _arrays(name: str, dataset: Any) -> Iterator[Array]:
@@ -210,7 +206,14 @@ def _arrays(name: str, dataset: Any) -> Iterator[Array]:
     for part in dataset.dtype.names:
         inner = dataset.dtype[part]
         shape = (*dataset.shape, *inner.shape)
-        yield Array(f"{name}.", f"{name}.{part}", shape, inner.base, partial(_read_part, dataset, part), unit)
+        yield Array(
+            f"{name}.",
+            f"{name}.{part}",
+            shape,
+            inner.base,
+            _rows_of(dataset, itemgetter(part)),
+            unit,
+        )
 
 
 def _of_pandas(group: str, node: Any) -> Iterator[Array]:
@@ -221,15 +224,13 @@ def _of_pandas(group: str, node: Any) -> Iterator[Array]:
         for k, label in enumerate(node[f"{block}_items"][()]):
             name = label.decode("utf-8", "replace") if isinstance(label, bytes) else str(label)
             values = node[f"{block}_values"]
-            yield Array(group, f"{group}{name}", values.shape[:1], values.dtype, partial(_read_column, values, k))
-
-
-def _read_column(values: Any, column: int, start: int, stop: int) -> Any:
-    return values[start:stop, column]
-
-
-def _read_part(dataset: Any, part: str, start: int, stop: int) -> Any:
-    return dataset[start:stop][part]
+            yield Array(
+                group,
+                f"{group}{name}",
+                values.shape[:1],
+                values.dtype,
+                _rows_of(values, itemgetter((slice(None), k))),
+            )
 
 
 def _unit(dataset: Any) -> str:
@@ -240,3 +241,89 @@ def _unit(dataset: Any) -> str:
         if isinstance(value, str):
             return value
     return ""
+
+
+# --- MATLAB -----------------------------------------------------------------------------------------------------------
+
+HDF5_MARK = b"\x89HDF\r\n\x1a\n"
+HDF5_AT = 512  # bytes; where MATLAB puts it
+OBJECTS = ("table", "timetable", "datetime", "duration", "timeseries", "string", "categorical")
+
+
+def open_matlab(file: Path, settings: LogFormat) -> ArraysLog:
+    """Open a MATLAB file. Raise InputError."""
+    try:
+        with open(file, "rb") as raw:
+            begin = raw.read(HDF5_AT + len(HDF5_MARK))
+    except OSError as error:
+        raise InputError(f"{file}: cannot be read ({error.strerror or error})") from None
+    is_hdf5 = begin[HDF5_AT:] == HDF5_MARK or begin.startswith(HDF5_MARK)
+    notes: list[str] = []
+    return ArraysLog(file, list((_arrays_of_hdf5 if is_hdf5 else _arrays_of_v5)(file, notes)), notes)
+
+
+def _note_of_object(file: Path, name: str) -> str:
+    return (
+        f"{file}: {name} is a MATLAB object (timetable, datetime, ...), which is not read; in MATLAB save it as a "
+        "struct: S = table2struct(timetable2table(T), 'ToScalar', true), times by posixtime, then save('log.mat', 'S')"
+    )
+
+
+def _arrays_of_v5(file: Path, notes: list[str]) -> Iterator[Array]:
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of objects, which are noted below
+            content = io.loadmat(file, struct_as_record=False, squeeze_me=True, chars_as_strings=True)
+    except Exception as error:  # scipy raises whatever a damaged file leads to, from KeyError to MemoryError
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise InputError(f"{file}: not a whole MATLAB file ({reason}); copy or save the file again") from None
+    for name, value in content.items():
+        if name == "None":
+            notes.append(_note_of_object(file, "a variable"))
+        elif not name.startswith("__"):
+            yield from _walk(file, name, value, "", notes)
+
+
+def _walk(file: Path, name: str, value: Any, topic: str, notes: list[str]) -> Iterator[Array]:
+    """Yield the arrays in a value."""
+    if hasattr(value, "_fieldnames"):
+        for key in value._fieldnames:
+            yield from _walk(file, f"{name}.{key}", getattr(value, key), f"{name}.", notes)
+    elif type(value).__name__ in ("MatlabOpaque", "MatlabFunction", "MatlabObject"):
+        notes.append(_note_of_object(file, name))
+    elif isinstance(value, np.ndarray) and value.dtype == object:
+        if value.size and isinstance(value.flat[0], str):
+            yield Array.of(topic, name, value.ravel(), False)
+            return
+        for k, inner in enumerate(value.flat, start=1):
+            yield from _walk(file, f"{name}[{k}]", inner, topic, notes)
+    elif isinstance(value, np.ndarray) and value.ndim and value.size and value.dtype.names is None:
+        yield Array.of(topic, name, value, value.ndim == 2 and value.shape[0] < value.shape[1])
+
+
+def _arrays_of_hdf5(file: Path, notes: list[str]) -> Iterator[Array]:
+    h5 = _open_hdf5(file)
+    try:
+        for name in h5:
+            if not name.startswith("#"):
+                yield from _walk_hdf5(file, h5, name, h5[name], "", notes)
+    except (OSError, RuntimeError, KeyError) as error:
+        raise _damaged(file, error) from None
+
+
+def _walk_hdf5(file: Path, h5: Any, name: str, node: Any, topic: str, notes: list[str]) -> Iterator[Array]:
+    kind = node.attrs.get("MATLAB_class", b"")
+    kind = kind.decode() if isinstance(kind, bytes) else str(kind)
+    if kind in OBJECTS or "MATLAB_object_decode" in node.attrs:
+        notes.append(_note_of_object(file, name))
+    elif hasattr(node, "keys"):
+        for key in node:
+            yield from _walk_hdf5(file, h5, f"{name}.{key}", node[key], f"{name}.", notes)
+    elif node.dtype == object:  # an array of structs holds references for each field
+        base, _, key = name.rpartition(".")
+        for k, reference in enumerate(np.asarray(node[()]).ravel(), start=1):
+            inner = f"{base}[{k}].{key}" if base else f"{name}[{k}]"
+            yield from _walk_hdf5(file, h5, inner, h5[reference], f"{base}[{k}]." if base else topic, notes)
+    elif kind != "char" and node.shape and "MATLAB_empty" not in node.attrs:
+        # MATLAB stores a matrix by columns and HDF5 shows it by rows; time runs along the longer side
+        yield Array.of(topic, name, node, len(node.shape) == 2 and node.shape[0] <= node.shape[1])

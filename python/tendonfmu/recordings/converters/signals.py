@@ -1,50 +1,40 @@
-"""What names and ranges of a log's fields tell: which signal a field is, in which unit, of which tendon or joint."""
+"""Which signal a field of a log is, in which unit, of which tendon or joint: by names, stated units and ranges."""
 
 from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeVar
 
 from tendonfmu.recordings.converters import units
-from tendonfmu.recordings.converters.inspection import FieldSummary, Inspection, TopicSummary
+from tendonfmu.recordings.converters.inspection import FieldSummary, Inspection
 from tendonfmu.recordings.converters.log import NUMBER
 from tendonfmu.recordings.converters.units import stated
 
-SURE, LIKELY, GUESS, UNDECIDED = "sure", "likely", "guess", "undecided"
-
-T = TypeVar("T")
-Member = tuple[TopicSummary, FieldSummary]
+SURE, LIKELY, GUESS, NOT_SURE = "sure", "likely", "guess", "undecided"
+Groups = dict[str, list[FieldSummary]]  # the fields of each group of columns, and of "torque"
+Unit = tuple[str, str, str]  # of a field, or "?"; how sure; why
 
 # --- which unit -------------------------------------------------------------------------------------------------------
 
-
-@dataclass(frozen=True)
-class Guess:
-    """A unit."""
-
-    unit: str  # its name, or "?"
-    sure: str  # SURE, LIKELY, GUESS or UNDECIDED
-    why: str  # in words
-
-
-# largest magnitude -> unit; what a finger's signals have in each unit. Between the ranges several units fit.
-FORCE = [(0.2, 700.0, "N", "lbf and kgf would fit too")]
-LENGTH = [
-    (0.0005, 0.2, "m", "a finger's tendon moves by centimetres"),
-    (0.5, 300.0, "mm", "a finger's tendon moves by centimetres"),
-]
-ANGLE = [(0.05, 3.3, "rad", "in degrees it would hardly be a motion"), (10.0, 400.0, "deg", "too much for radians")]
-TORQUE = [(0.005, 80.0, "N.m", "the usual unit")]
-ANGULAR_SPEED = [
-    (0.05, 15.0, "rad/s", "in degrees per second it would hardly be a motion"),
-    (40.0, 2000.0, "deg/s", "too fast for radians"),
-]
-RANGES = {"force": FORCE, "length": LENGTH, "angle": ANGLE, "torque": TORQUE, "angular speed": ANGULAR_SPEED}
-SI = {"angle": "rad", "angular speed": "rad/s", "torque": "N.m", "force": "N", "length": "m"}
-
+# quantity: least and largest magnitude that a finger's signals have in a unit, how sure it is, why
+RANGES = {
+    "force": [(0.2, 700.0, "N", GUESS, "lbf and kgf would fit too")],
+    "length": [
+        (0.0005, 0.2, "m", LIKELY, "a finger's tendon moves by centimetres"),
+        (0.5, 300.0, "mm", LIKELY, "a finger's tendon moves by centimetres"),
+    ],
+    "angle": [
+        (0.05, 3.3, "rad", LIKELY, "in degrees it would hardly be a motion"),
+        (10.0, 400.0, "deg", LIKELY, "too much for radians"),
+    ],
+    "torque": [(0.005, 80.0, "N.m", GUESS, "the usual unit")],
+    "angular speed": [
+        (0.05, 15.0, "rad/s", LIKELY, "in degrees per second it would hardly be a motion"),
+        (40.0, 2000.0, "deg/s", LIKELY, "too fast for radians"),
+    ],
+}
 EPOCHS = {"epoch_s": 1.0, "epoch_ms": 1e3, "epoch_us": 1e6, "epoch_ns": 1e9}
 FROM_1990, TO_2100 = 631_152_000.0, 4_102_444_800.0  # s
 SLOWEST = 120.0  # s; of a date: a timer's µs of more than a quarter of an hour look like s since 1990
@@ -52,42 +42,38 @@ SLOWEST = 120.0  # s; of a date: a timer's µs of more than a quarter of an hour
 STEPS = [(1e-5, 0.12, "s"), (0.5, 120.0, "ms"), (500.0, 120e3, "us"), (500e3, 120e6, "ns")]
 
 
-def unit_of(name: str, unit: str, quantity: str, low: float, high: float, ros: bool) -> Guess:
+def unit_of(signal: FieldSummary, quantity: str, is_ros: bool) -> Unit:
     """Return the unit of a signal of a known quantity."""
-    statement = stated(name, unit)
-    if statement:
-        stated_unit, stated_quantity, where = statement
-        if stated_quantity == quantity:
-            return Guess(stated_unit, SURE, where)
-        return Guess("?", UNDECIDED, f"{where}, which is no {quantity}")
-    span, largest = f"{low:.4g} to {high:.4g}", max(abs(low), abs(high))
-    fits = {name: why for least, most, name, why in RANGES[quantity] if least <= largest <= most}
-    if ros:
-        usual = SI[quantity]
-        doubt = f", though {span} is unusual for it" if usual not in fits and largest > 0 else ""
-        return Guess(usual, GUESS if doubt else LIKELY, f"the unit of ROS messages (REP 103){doubt}")
+    if statement := stated(signal.field.name, signal.field.unit):
+        unit, its, where = statement
+        return (unit, SURE, where) if its == quantity else ("?", NOT_SURE, f"{where}, which is no {quantity}")
+    span, largest = f"{signal.low:.4g} to {signal.high:.4g}", max(abs(signal.low), abs(signal.high))
+    fits = [row for row in RANGES[quantity] if row[0] <= largest <= row[1]]
+    if is_ros:
+        usual = units.si_of(units.QUANTITIES[quantity])
+        is_unusual = largest > 0 and usual not in [row[2] for row in fits]
+        doubt = f", though {span} is unusual for it" if is_unusual else ""
+        return usual, GUESS if doubt else LIKELY, f"the unit of ROS messages (REP 103){doubt}"
     if len(fits) == 1:
-        ((fitting, why),) = fits.items()
-        is_weak = quantity in ("force", "torque")
-        return Guess(fitting, GUESS if is_weak else LIKELY, f"{span} fits {fitting}; {why}")
-    return Guess("?", UNDECIDED, f"{span} fits none of {', '.join(units.QUANTITIES[quantity])} alone")
+        ((_, _, unit, sure, why),) = fits
+        return unit, sure, f"{span} fits {unit}; {why}"
+    return "?", NOT_SURE, f"{span} fits none of {', '.join(units.QUANTITIES[quantity])} alone"
 
 
-def unit_of_time(name: str, unit: str, first: float, step: float) -> Guess:
+def unit_of_time(name: str, unit: str, first: float, step: float) -> Unit:
     """Return the unit of a clock, by its first reading and median step."""
     for stamp, per_second in EPOCHS.items():
         if FROM_1990 <= first / per_second <= TO_2100 and step / per_second < SLOWEST:
-            return Guess(
-                stamp, SURE if step > 0 else LIKELY, f"{first:.0f} is a date of our time in {stamp[6:]} since 1970"
-            )
+            why = f"{first:.0f} is a date of our time in {stamp[6:]} since 1970"
+            return stamp, SURE if step > 0 else LIKELY, why
     statement = stated(name, unit)
     if statement and statement[1] == "time":
-        return Guess(statement[0], SURE, statement[2])
+        return statement[0], SURE, statement[2]
     for least, most, fitting in STEPS:
         if least <= step <= most:
             rate = f"{1.0 / (step * units.TIME[fitting]):.4g} samples per second"
-            return Guess(fitting, LIKELY, f"a median step of {step:.4g} would be {rate}")
-    return Guess("?", UNDECIDED, f"a median step of {step:.4g} fits none of s, ms, us, ns")
+            return fitting, LIKELY, f"a median step of {step:.4g} would be {rate}"
+    return "?", NOT_SURE, f"a median step of {step:.4g} fits none of s, ms, us, ns"
 
 
 # --- which tendon or joint --------------------------------------------------------------------------------------------
@@ -103,23 +89,22 @@ class Order:
 
     def line(self) -> str:
         """Return the order in one line, and what to do about it."""
-        how = "as in the log" if self.sure == GUESS else "by the numbers in their names"
+        how, doubt = ("as in the log", "a guess") if self.sure == GUESS else ("by the numbers in their names", "likely")
         listed = ", ".join(f"{k} = {' and '.join(names)}" for k, names in enumerate(self.elements, start=1))
-        doubt = "a guess" if self.sure == GUESS else "likely"
         return f"order of {self.of} {how}, {doubt}; check it against the finger: {listed}"
+
+
+def in_order(signals: Sequence[FieldSummary]) -> tuple[list[FieldSummary], bool]:
+    """Return fields by the numbers in their names, and True; or in their own order, and False."""
+    numbers = {id(signal): _numbers_of(signal.field.name) for signal in signals}
+    if all(numbers.values()) and len(set(numbers.values())) == len(signals):
+        return sorted(signals, key=lambda signal: numbers[id(signal)]), True
+    return list(signals), False
 
 
 def _numbers_of(name: str) -> tuple[int, ...]:
     """Return the numbers in a name; those of a unit in brackets do not count."""
     return tuple(int(part) for part in re.findall(r"\d+", _without_unit(name)))
-
-
-def in_order(members: Sequence[T], name_of: Callable[[T], str]) -> tuple[list[T], bool]:
-    """Return members by the numbers in their names, and True; or in their own order, and False."""
-    numbers = [_numbers_of(name_of(member)) for member in members]
-    if all(numbers) and len(set(numbers)) == len(numbers):
-        return sorted(members, key=lambda member: _numbers_of(name_of(member))), True
-    return list(members), False
 
 
 def matched(names: Sequence[str], others: Sequence[str]) -> list[int] | None:
@@ -154,33 +139,30 @@ def _stems(names: Sequence[str]) -> list[Counter[str]]:
     texts = [_without_unit(name).lower().strip() for name in names]
     if len(texts) < 2:
         return [Counter() for _ in texts]
-    first = _length_of_beginning(texts)
-    last = _length_of_beginning([text[first:][::-1] for text in texts])
+    first = _alike(texts)
+    last = _alike([text[first:][::-1] for text in texts])
     return [Counter([text[first : len(text) - last]]) for text in texts]
 
 
-def _length_of_beginning(texts: Sequence[str]) -> int:
-    """Return how many letters all texts begin with."""
-    least = min(len(text) for text in texts)
-    return next((k for k in range(least) if len({text[k] for text in texts}) > 1), least)
+def _alike(texts: Sequence[str]) -> int:
+    """Return with how many equal letters all texts begin."""
+    return next((k for k, letters in enumerate(zip(*texts, strict=False)) if len({*letters}) > 1), min(map(len, texts)))
 
 
 def _without_unit(name: str) -> str:
     return re.sub(r"[\[(]([^\])]+)[\])]", lambda match: " " if units.quantity(match[1].strip()) else match[0], name)
 
 
-def order_of(of: str, by_number: bool, groups: Sequence[Sequence[str]]) -> Order:
-    """Return the order of elements."""
-    longest = max((len(names) for names in groups), default=0)
-    elements = tuple(tuple(names[k] for names in groups if k < len(names) and names[k]) for k in range(longest))
-    return Order(of, LIKELY if by_number else GUESS, elements)
-
-
 # --- which signal -----------------------------------------------------------------------------------------------------
 
-BY_QUANTITY = {"force": "tendon_force", "length": "tendon_position", "angle": "joint_position", "torque": "torque"}
-BY_QUANTITY["angular speed"] = "joint_velocity"
-
+QUANTITY = {
+    "tendon_force": "force",
+    "tendon_position": "length",
+    "joint_position": "angle",
+    "joint_velocity": "angular speed",
+    "external_torque": "torque",
+    "torque": "torque",
+}
 TENDON = {"tendon", "tendons", "cable", "spool", "motor", "motors", "actuator", "wire", "winch", "excursion"}
 TENDON |= {"flexor", "extensor", "flexors", "extensors"}
 MOTION = {"position", "pos", "length", "displacement", "stroke", "excursion", "travel", "spool", "x"}
@@ -203,41 +185,56 @@ CLOCKS = (["time"], ["timestamp"], ["stamp"], ["date"], ["clock"], ["millis"], [
 VALUES = {"value", "values", "data"}  # names of arrays that say nothing
 KNOWN = TENDON | FORCES | TORQUES | SPEEDS | ANGLES | REFERENCE
 
+# words of which a name has one of each set, or the quantity of its unit: what it is. The first row that fits counts
+RULES: tuple[tuple[tuple[set[str], ...], str], ...] = (
+    ((OTHERS,), ""),
+    ((CONTACT,), "contact"),
+    ((TORQUES, REFERENCE), "external_torque"),
+    (({"=angle"}, JOINT), "joint_position"),
+    (({"=angle"}, TENDON), "tendon_position"),  # a motor's angle, which needs the radius of its spool
+    *(((({f"={quantity}"},), group)) for group, quantity in QUANTITY.items() if group != "external_torque"),
+    (({"=time", "=speed"},), ""),
+    ((SPEEDS, TENDON), ""),
+    ((SPEEDS,), "joint_velocity"),
+    ((FORCES,), "tendon_force"),
+    ((TENDON, {"effort"}), "tendon_force"),
+    ((TORQUES,), "torque"),
+    ((TENDON, MOTION), "tendon_position"),
+    ((ANGLES,), "joint_position"),
+)
 # what an element is by its own name -> what it is in an array of these
 OF_SIBLINGS = {"tendon_force": ("torque", "external_torque"), "tendon_position": ("joint_position",)}
-
 _ELEMENT = re.compile(r"(.*)\[([^\[\]]+)\]")
 
 
-def field_groups(inspection: Inspection) -> tuple[dict[str, list[Member]], set[str]]:
-    """Sort the fields of a log into groups of columns."""
-    groups: dict[str, list[Member]] = {}
+def field_groups(inspection: Inspection) -> tuple[Groups, set[str]]:
+    """Sort the fields of a log into groups; and names of positions that are known only as many and named as forces."""
+    found: Groups = {}
     for topic in inspection.topics:
         clock = None if topic.clock is None else topic.clock.name
-        signals = [summary for summary in topic.fields if summary.field.name != clock]
+        signals = [signal for signal in topic.fields if signal.field.name != clock]
         for signal, group in zip(signals, _of_siblings(signals), strict=True):
             if group:
-                groups.setdefault(group, []).append((topic, signal))
-    for group, members in list(groups.items()):
+                found.setdefault(group, []).append(signal)
+    groups: Groups = {}
+    for group, signals in found.items():
         # a constant is no signal; beside moving ones of the same name it may be a sensor that is not connected
-        moving = {_family(summary) for _, summary in members if summary.low < summary.high}
-        kept = [member for member in members if group == "contact" or _family(member[1]) in moving]
-        groups[group] = kept
-        if not kept:
-            del groups[group]
+        moving = {_family(signal) for signal in signals if signal.low < signal.high}
+        if kept := [signal for signal in signals if group == "contact" or _family(signal) in moving]:
+            groups[group] = kept
     return groups, _positions_of_tendons(groups)
 
 
-def _family(summary: FieldSummary) -> str:
+def _family(signal: FieldSummary) -> str:
     """Return what the names of the elements of one array have in common."""
-    name = summary.field.name
+    name = signal.field.name
     return _array_of(name) or re.sub(r"\d+", "", _without_unit(name))
 
 
-def _of_siblings(fields: Sequence[FieldSummary]) -> list[str | None]:
-    """Return the groups of a topic's fields. Elements of an array whose others are all of tendons are too."""
-    alone = [_group_of(summary) for summary in fields]
-    arrays = [_array_of(summary.field.name) for summary in fields]
+def _of_siblings(signals: Sequence[FieldSummary]) -> list[str]:
+    """Return the groups of a topic's fields, or "". Elements of an array whose others are all of tendons are too."""
+    alone = [_group_of(signal) for signal in signals]
+    arrays = [_array_of(signal.field.name) for signal in signals]
     groups = list(alone)
     for k, array in enumerate(arrays):
         siblings = {alone[i] for i, other in enumerate(arrays) if array and other == array and i != k}
@@ -247,16 +244,16 @@ def _of_siblings(fields: Sequence[FieldSummary]) -> list[str | None]:
     return groups
 
 
-def _positions_of_tendons(groups: dict[str, list[Member]]) -> set[str]:
+def _positions_of_tendons(groups: Groups) -> set[str]:
     """Take positions for those of tendons if they are as many as the forces and numbered or named like them."""
     forces, angles = groups.get("tendon_force", []), groups.get("joint_position", [])
     if "tendon_position" in groups or len(forces) < 2 or len(angles) != len(forces):
         return set()
-    fields = [summary.field for _, summary in angles]
-    names = [field.name for field in fields]
-    are_alike = len(set(names)) == len({summary.field.name for _, summary in forces}) == 1
-    are_joints = any(stated(field.name, field.unit) or set(words_of(field.name)) & OF_JOINTS_ONLY for field in fields)
-    if are_joints or not (are_alike or matched([summary.field.name for _, summary in forces], names)):
+    names, of_forces = [signal.field.name for signal in angles], [signal.field.name for signal in forces]
+    are_alike = len(set(names)) == len(set(of_forces)) == 1
+    are_joints = any(stated(each.field.name, each.field.unit) for each in angles)
+    are_joints = are_joints or any(set(words_of(name)) & OF_JOINTS_ONLY for name in names)
+    if are_joints or not (are_alike or matched(of_forces, names)):
         return set()
     groups["tendon_position"] = groups.pop("joint_position")
     return set(names)
@@ -276,44 +273,25 @@ def words_of(name: str) -> list[str]:
     return [word.lower() for word in re.findall(r"[A-Za-z]+", apart)]
 
 
-def _group_of(summary: FieldSummary) -> str | None:
-    """Return what a field likely is: a group of columns, "torque", or None."""
-    if words_of(summary.field.name)[-1:] in CLOCKS:
-        return None
-    parts = set(re.split(r"[./]", summary.field.name.lower()))
-    if summary.field.kind != NUMBER or summary.count == summary.missing or parts & STRUCTURE:
-        return None
-    array = _array_of(summary.field.name)
+def _group_of(signal: FieldSummary) -> str:
+    """Return what a field likely is: a group of columns, "torque", or ""."""
+    name, words = signal.field.name, words_of(signal.field.name)
+    is_structure = set(re.split(r"[./]", name.lower())) & STRUCTURE
+    if words[-1:] in CLOCKS or is_structure or signal.field.kind != NUMBER or signal.count == signal.missing:
+        return ""
+    array = _array_of(name)
     context = set(words_of(array))
     if array and not context & (OTHERS | CONTACT):
         if context & TORQUES and not context & REFERENCE:
-            return "tendon_force" if set(words_of(summary.field.name)) & TENDON else "torque"
+            return "tendon_force" if set(words) & TENDON else "torque"
         says_little = array.rpartition(".")[2].lower() in VALUES
-        group = _by_words(context, summary) if context & (TENDON | FORCES | REFERENCE) and not says_little else None
-        if group is not None:
+        if context & (TENDON | FORCES | REFERENCE) and not says_little and (group := _by_rules(context, signal)):
             return group
-    return _by_words(set(words_of(summary.field.name)), summary)
+    return _by_rules(set(words), signal)
 
 
-def _by_words(words: set[str], summary: FieldSummary) -> str | None:
-    if words & OTHERS:
-        return None
-    if words & CONTACT:
-        return "contact" if summary.only_flags else None
-    if words & TORQUES and words & REFERENCE:
-        return "external_torque"
-    statement = stated(summary.field.name, summary.field.unit)
-    if statement is not None:
-        quantity = statement[1]
-        if quantity == "angle" and words & TENDON and not words & JOINT:
-            return "tendon_position"  # a motor's angle, which needs the radius of its spool
-        return BY_QUANTITY.get(quantity)
-    if words & SPEEDS:
-        return None if words & TENDON else "joint_velocity"
-    if words & FORCES or (words & TENDON and words & {"effort"}):
-        return "tendon_force"
-    if words & TORQUES:
-        return "torque"
-    if words & TENDON and words & MOTION:
-        return "tendon_position"
-    return "joint_position" if words & ANGLES else None
+def _by_rules(words: set[str], signal: FieldSummary) -> str:
+    statement = stated(signal.field.name, signal.field.unit)
+    known = words | ({f"={statement[1]}"} if statement else set())
+    group = next((group for sets, group in RULES if all(known & wanted for wanted in sets)), "")
+    return "" if group == "contact" and not signal.only_flags else group
