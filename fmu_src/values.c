@@ -44,7 +44,7 @@ fmu_status check_value_count(component* c, fmu_function function, variable_type 
 /* Where the variables of a call live, as many as `places` holds, into it. What is wrong with one of them is said. */
 static fmu_status find_places(component* c, fmu_function function, variable_type type, const unsigned references[],
                               size_t count, variable_places* places) {
-  variable found;
+  variable found = {0};
   const size_t known = places->references;
   if (known && known <= count && memcmp(places->of, references, known * sizeof *references) == 0) {
     return FMU_OK;
@@ -95,7 +95,7 @@ static void put_value(void* values, value_format format, size_t at, double value
 
 /* Until the first sample is taken outputs follow the inputs; before the initialisation mode there are none. */
 static fmu_status update_outputs(component* c, fmu_function function, const unsigned references[], size_t count) {
-  variable found;
+  variable found = {0};
   for (size_t i = 0; !c->failed && c->phase == PHASE_INSTANTIATED && i < count; ++i) {
     variables_find(&c->values, references[i], &found);
     if (variable_causality_of(&found) == CAUSALITY_OUTPUT) {
@@ -151,7 +151,7 @@ static fmu_status check_writable(component* c, fmu_function function, const vari
  * refused is named. Inputs, all of them Real, may have any, since the step alone may discard them. */
 static fmu_status check_values(component* c, fmu_function function, const variable_places* places, const void* values,
                                value_format format, size_t at) {
-  variable found;
+  variable found = {0};
   for (size_t i = 0; i < places->references; ++i) {
     variables_find(&c->values, places->of[i], &found);
     const int is_input = variable_causality_of(&found) == CAUSALITY_INPUT;
@@ -171,7 +171,7 @@ static fmu_status check_values(component* c, fmu_function function, const variab
 
 /* Hands the model the settings that were written. */
 static void give_settings(component* c, const variable_places* places) {
-  variable found;
+  variable found = {0};
   for (size_t i = 0; i < places->references; ++i) {
     variables_find(&c->values, places->of[i], &found);
     c->values.parameters_pending |= !found.group;
