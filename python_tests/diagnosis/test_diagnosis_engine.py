@@ -18,7 +18,8 @@ from fit_data import make_recording, wavy_forces, wavy_motion
 from repetitions import repeated
 from tendonfmu.diagnosis import base as base_module
 from tendonfmu.diagnosis import search as search_module
-from tendonfmu.diagnosis.base import delay_of_positions, find_base
+from tendonfmu.diagnosis.base import find_base
+from tendonfmu.diagnosis.delay import Positions
 from tendonfmu.diagnosis.diagnosis import PHASES
 from tendonfmu.diagnosis.effects import Place, Term, Where, by_name
 from tendonfmu.diagnosis.extension_diagnosis import merged
@@ -139,7 +140,7 @@ def test_angles_stay_as_the_core_sees_them_where_forces_are_late(delay: float, s
 @pytest.mark.parametrize("samples", [4, -3])
 def test_positions_and_forces_tell_their_delay(samples: int) -> None:
     made = recorded(finger(), 23, 1, 20.0, samples)
-    assert delay_of_positions(finger(), [made]) == pytest.approx(samples / RATE, abs=5e-4)
+    assert Positions(described(finger()), [made]).delay == pytest.approx(samples / RATE, abs=5e-4)
 
 
 def test_no_more_tendons_than_joints_tell_no_delay(sound: FitRecording) -> None:
@@ -148,8 +149,24 @@ def test_no_more_tendons_than_joints_tell_no_delay(sound: FitRecording) -> None:
     groups = {name: values[:, 1:3] if "tendon" in name else values for name, values in sound.recording.groups.items()}
     encoders = replace(sound, recording=replace(sound.recording, groups=groups))
     few = replace(sound, recording=replace(sound.recording, groups={k: v for k, v in groups.items() if "tendon" in k}))
-    assert delay_of_positions(data, [few]) is None
-    assert delay_of_positions(data, [encoders]) == pytest.approx(0.0, abs=5e-4), "encoders tell it"
+    assert Positions(described(data), [few]).delay is None
+    assert Positions(described(data), [encoders]).delay == pytest.approx(0.0, abs=5e-4), "encoders tell it"
+
+
+def test_described_springs_that_are_not_linear_hide_no_delay() -> None:
+    """Taken for linear, they leave too much in the equation to tell it."""
+    hardening, samples = 4e5, 4
+    made = recorded(finger(), 23, 1, 20.0, samples)
+    force = np.roll(made.recording.groups["tendon_force"], -samples, axis=0)
+    bent = 2.0 * force / (STIFFNESS + np.sqrt(STIFFNESS**2 + 4.0 * hardening * force)) - force / STIFFNESS
+    bent = made.with_groups(tendon_position=made.recording.groups["tendon_position"] + bent)
+    rows = [{"effect": "tendon_nonlinearity", "tendon": i, "hardening": hardening} for i in range(1, 5)]
+    shown = Positions(described(finger() | {"extensions": rows}), [bent])
+    assert shown.delay == pytest.approx(samples / RATE, abs=5e-4)
+    assert Positions(described(finger()), [bent]).delay is None
+    (flags,) = [bent.train]
+    assert shown.gain([(bent, flags)], samples / RATE, 0).low > 0.5
+    assert shown.gain([(bent, flags)], -samples / RATE, 0).high < 0.0
 
 
 def found_base(truth: Mapping[str, Any], seed: int, source: int, delay: int = 0) -> Any:

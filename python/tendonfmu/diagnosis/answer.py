@@ -286,7 +286,8 @@ def _verdict(explained: bool, unknown: bool) -> str:
 def cause_of(found: Judged, **numbers: Any) -> Cause:
     """Return a cause with its words and its rivals; `numbers` are further fields of `Cause`."""
     effect, rivals = found.effect, tuple(other.where for other in found.alike)
-    known: dict[str, Any] = {"gain": found.gain, "confusable_with": rivals, "sensors": found.sensors} | numbers
+    known: dict[str, Any] = {"gain": found.gain, "gain_unit": found.gain_unit, "confusable_with": rivals}
+    known |= {"sensors": found.sensors} | numbers
     return Cause(found.where, title_of(effect), _explanation(found), found.p_value, **known)
 
 

@@ -10,14 +10,14 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from tendonfmu.arrays import Data, Flags, Numbers
-from tendonfmu.diagnosis.effects import MECHANISMS, Mechanism, Place, Term, Where, by_name
+from tendonfmu.diagnosis.delay import DELAY, HELD, Positions, delay_of_torque, late_forces
+from tendonfmu.diagnosis.effects import MECHANISMS, Mechanism, Term, Where, by_name
 from tendonfmu.diagnosis.extension_fit import (
     FitSettings,
     FittedModel,
@@ -26,20 +26,14 @@ from tendonfmu.diagnosis.extension_fit import (
     memory_of,
     memory_terms,
 )
-from tendonfmu.diagnosis.samples import Samples, shifted
+from tendonfmu.diagnosis.samples import Samples
 from tendonfmu.diagnosis.selection import Judged, LeastSizes, least_sizes
 from tendonfmu.diagnosis.view import View, look
 from tendonfmu.estimate import choose_memory
-from tendonfmu.model import EFFECT_NUMBERS, Finger, moment_arms
+from tendonfmu.model import Finger
 from tendonfmu.recordings import FitRecording
 
-LONGEST_DELAY = EFFECT_NUMBERS["time_delay"]["delay"].most  # s in either direction
-FINE = 0.001  # s
-LARGE = 0.005  # s: smaller delays compete with other causes, by their derivative
-CLEAR_GAIN = 0.1  # of the rms that a starting delay must remove: any other missing effect looks a little like a delay
-CLEAR = 0.25  # error of the best delay, at most, over the median error of all delays
 POSITION = ("cover_stiffness", "cover_hardening", "gravity", "joint_coupling")  # torque that depends on angles alone
-DELAY = by_name("time_delay")
 
 
 @dataclass(frozen=True)
@@ -52,6 +46,7 @@ class Base:
     start: tuple[tuple[Term, ...], ...]  # delay, position-dependent torque and memory that the description lacks
     model: FittedModel  # fitted with `start`
     settings: FitSettings
+    positions: Positions  # what they tell of a delay
 
     def look(self, model: FittedModel, mechanisms: Sequence[Mechanism] = MECHANISMS) -> View:
         """Return what a model that was fitted to the samples lacks."""
@@ -75,14 +70,20 @@ def refitted(model: FittedModel, samples: Samples, settings: FitSettings, rough:
     )
 
 
-def find_base(given: Finger, recordings: Sequence[FitRecording], settings: FitSettings, least_gain: float) -> Base:
-    """Fit the given description, and find what it lacks of delay, position-dependent torque and memory.
+def find_base(
+    given: Finger,
+    recordings: Sequence[FitRecording],
+    settings: FitSettings,
+    least_gain: float,
+    known: Sequence[tuple[Term, ...]] = (),
+) -> Base:
+    """Fit the given description, and find what it lacks beside `known`: delay, position-dependent torque and memory.
 
     The last answer is kept, because a history asks the same of its reference for every recording.
     """
-    key = _digest(given, recordings, settings, least_gain)
+    key = _digest(given, recordings, settings, least_gain, known)
     if key not in _LAST:
-        found = _found_base(given, recordings, settings, least_gain)
+        found = _found_base(given, recordings, settings, least_gain, known)
         _LAST.clear()
         _LAST[key] = found
     return _LAST[key]
@@ -91,9 +92,9 @@ def find_base(given: Finger, recordings: Sequence[FitRecording], settings: FitSe
 _LAST: dict[str, Base] = {}
 
 
-def _digest(given: Finger, recordings: Sequence[FitRecording], settings: FitSettings, least_gain: float) -> str:
+def _digest(given: Finger, recordings: Sequence[FitRecording], *others: object) -> str:
     """Return a hash of everything that a base depends on."""
-    known = hashlib.sha256(json.dumps([given.data, str(settings), least_gain]).encode())
+    known = hashlib.sha256(json.dumps([given.data, str(others)]).encode())
     for recording in recordings:
         known.update(f"{recording.kinematics} {recording.parts}".encode())
         groups = [values for _, values in sorted(recording.recording.groups.items())]
@@ -102,21 +103,32 @@ def _digest(given: Finger, recordings: Sequence[FitRecording], settings: FitSett
     return known.hexdigest()
 
 
-def _found_base(given: Finger, recordings: Sequence[FitRecording], settings: FitSettings, least_gain: float) -> Base:
+def _found_base(
+    given: Finger,
+    recordings: Sequence[FitRecording],
+    settings: FitSettings,
+    least_gain: float,
+    known: Sequence[tuple[Term, ...]],
+) -> Base:
     samples = Samples.of(given.data, recordings, settings.threads)
     nominal = fit_numbers(given.data, samples, settings)
     samples = samples.as_rests_demand(nominal.data)
     nominal = refitted(nominal, samples, settings)
     least = least_sizes(given.data, recordings, float(np.median(np.diff(recordings[0].time))))
-    late = _delay_of_positions(nominal.data, samples, least)
-    start = list(_position_dependent(extended_description(nominal.data, late or ()), samples, least, least_gain))
-    start += [late] if late else []
+    positions = Positions(given, samples.recordings)
+    late: tuple[Term, ...] = ()
+    is_new = bool(DELAY.places(nominal.data, samples.recordings[0].kinematics))
+    if is_new and positions.delay is not None and abs(positions.delay) >= least.least(Where(DELAY.name)):
+        late = late_forces(positions.delay, fixed=True)
+    start = [*known, late] if late else list(known)
+    described = extended_description(nominal.data, [term for terms in start for term in terms])
+    start = [*_position_dependent(described, samples, least, least_gain), *start]
     model, memory = _with_memory(given, nominal, start, samples, settings)
-    if late is None and (late := _delay_of_torque(model, samples, least)):
+    if positions.delay is None and (late := delay_of_torque(model, samples, least)):
         others = _with_memory(given, nominal, [*start, late], samples, settings)
         if others[0].cost < model.cost:
             (model, memory), start = others, [*start, late]
-    return Base(samples, least, nominal, (*start, *memory), model, settings)
+    return Base(samples, least, nominal, (*start, *memory), model, settings, positions)
 
 
 # --- position-dependent torque ----------------------------------------------------------------------------------------
@@ -139,76 +151,15 @@ def _with_memory(
 ) -> tuple[FittedModel, list[tuple[Term, ...]]]:
     """Return the model with the memory that recordings choose, and the terms of it that the description lacks."""
     described = extended_description(nominal.data, [term for terms in start for term in terms])
-    return remembering(replace(given, data=described), nominal, samples, settings)
+    fixed = HELD if any(term.fixed for terms in start for term in terms) else ()
+    return remembering(replace(given, data=described), nominal, samples, settings, fixed)
 
 
 def remembering(
-    described: Finger, nominal: FittedModel, samples: Samples, settings: FitSettings
+    described: Finger, nominal: FittedModel, samples: Samples, settings: FitSettings, fixed: tuple[str, ...] = ()
 ) -> tuple[FittedModel, list[tuple[Term, ...]]]:
     """Fit a description with the memory that recordings choose, from several starts; return what is new of it, too."""
-    choice = choose_memory(described, samples.recordings, settings.choice, threads=settings.threads)
-    model = FittedModel(choice.finger.data, nominal.given, {})
+    fitted = replace(settings.choice, fix=(*settings.choice.fix, *fixed))
+    choice = choose_memory(described, samples.recordings, fitted, threads=settings.threads)
+    model = FittedModel(choice.finger.data, nominal.given, {}, fixed=fixed)
     return refitted(model, samples, settings), memory_terms(nominal.data, memory_of(choice.finger.data))
-
-
-# --- delay ------------------------------------------------------------------------------------------------------------
-
-
-def _delay_of_torque(model: FittedModel, samples: Samples, least: LeastSizes) -> tuple[Term, ...]:
-    """Return a delay of forces that is too large for its derivative, beside a fitted model; () if there is none."""
-    if not DELAY.places(model.data, samples.recordings[0].kinematics):
-        return ()
-    # a grid of all delays that a description accepts, including 0
-    grid = max(2 * FINE, float(np.median(np.diff(samples.recordings[0].time))) / 2)
-    delays = grid * np.arange(-int(LONGEST_DELAY / grid), int(LONGEST_DELAY / grid) + 1)
-    late = ([shifted(each, each.target, delay) - each.target for each in samples.recordings] for delay in delays)
-    moved = np.stack([samples.grid.means(changes) for changes in late], axis=2)
-    view = look(model.data, samples, least, (), model)
-    errors = view.grams.errors_of(view.series.target[:, :, None] + moved)
-    still, best = int(np.argmin(np.abs(delays))), int(np.argmin(errors))
-    # an optimum at the edge is no minimum; a small delay competes with other causes, by its derivative
-    is_large = 0 < best < len(delays) - 1 and abs(delays[best]) >= LARGE
-    clear = is_large and errors[best] < (1.0 - CLEAR_GAIN) ** 2 * errors[still]
-    return _late(float(delays[best])) if clear else ()
-
-
-def _delay_of_positions(data: Data, samples: Samples, least: LeastSizes) -> tuple[Term, ...] | None:
-    """Return a delay of forces that positions show; None if they do not show whether there is one."""
-    known = delay_of_positions(data, samples.recordings)
-    if known is None or not DELAY.places(data, samples.recordings[0].kinematics):
-        return None
-    return _late(known) if abs(known) >= least.least(Where("time_delay")) else ()
-
-
-def _late(delay: float) -> tuple[Term, ...]:
-    return (Term(DELAY, Place(), {"delay": delay}, (1.0,)),)
-
-
-def delay_of_positions(data: Mapping[str, Any], recordings: Sequence[FitRecording]) -> float | None:
-    """Return by how many seconds forces are later than positions; None if the recordings do not show it.
-
-    With joint encoders, or more tendons than joints, the joint-side positions x0 − f0/k agree with the angles, or with
-    each other, only if positions and forces are of the same time.
-    """
-    arms = moment_arms(data)
-    measured = all({"joint_position", "tendon_position"} <= set(each.recording.groups) for each in recordings)
-    apart = np.eye(len(arms)) - (0.0 if measured else arms @ np.linalg.pinv(arms))
-    if np.linalg.matrix_rank(apart) == 0 or "tendon_position" not in recordings[0].recording.groups:
-        return None
-    delays = np.arange(-LONGEST_DELAY, LONGEST_DELAY + FINE / 2, FINE)
-    errors = np.zeros(len(delays))
-    stiffness = np.array([tendon["stiffness"] for tendon in data["tendons"]])
-    for recording in recordings:
-        groups = recording.recording.groups
-        position = groups["tendon_position"] - (groups["joint_position"] @ arms.T if measured else 0.0)
-        for part in recording.parts:
-            time, force = recording.time[part], groups["tendon_force"][part] / stiffness
-            for k, delay in enumerate(delays):
-                late = [np.interp(time - delay, time, column) for column in position[part].T]
-                left = (np.stack(late, axis=1) - force) @ apart
-                errors[k] += float(np.sum((left - left.mean(axis=0)) ** 2))
-    best = int(np.argmin(errors))
-    if not 0 < best < len(delays) - 1 or errors[best] > CLEAR * float(np.median(errors)):
-        return None
-    before, at, after = errors[best - 1 : best + 2]
-    return float(delays[best] + FINE * 0.5 * (before - after) / max(before - 2 * at + after, 1e-300))

@@ -17,12 +17,11 @@ from time import perf_counter
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from tendonfmu.diagnosis.answer import Asked
-from tendonfmu.diagnosis.base import find_base
 from tendonfmu.diagnosis.change_diagnosis import Changes
 from tendonfmu.diagnosis.extension_diagnosis import Lacks
 from tendonfmu.diagnosis.extension_fit import FitSettings
+from tendonfmu.diagnosis.force_gains import Beginning
 from tendonfmu.diagnosis.inputs import read_input
-from tendonfmu.diagnosis.kinematic_causes import find_kinematic_causes
 from tendonfmu.diagnosis.result import Diagnosis
 from tendonfmu.errors import own_fault
 from tendonfmu.model import FingerSource
@@ -61,11 +60,17 @@ def diagnose(
     with threadpool_limits(limits=max(jobs, 1)):
         given = read_input(finger, recordings, tests, reference, kinematics, least_gain, checked)
         settings = FitSettings(threads=jobs, path=given.finger.path)
-        kinematic = find_kinematic_causes(given, least_gain, seed)
-        given = kinematic.corrected(given)
         with phases.start(BASE):
-            base = find_base(given.finger, given.reference or given.whole, settings, least_gain)
-        asked = Asked(given, least_gain, seed, settings, phases)
+            simplest = Beginning.of(given, settings, least_gain, seed)
+            beginning = simplest.with_gains(given, settings, least_gain, seed)
         with own_fault("diagnosis"):  # all input has been checked and fitted once
-            question = Changes(asked, base) if given.reference else Lacks(asked, base)
-            return replace(kinematic.in_diagnosis(question.diagnosis()), seconds=perf_counter() - begun)
+            found = _found(beginning, least_gain, seed, settings, phases)
+            if not beginning.is_confirmed(found):
+                beginning, found = simplest, _found(simplest, least_gain, seed, settings, phases)
+            return replace(beginning.in_diagnosis(found), seconds=perf_counter() - begun)
+
+
+def _found(beginning: Beginning, least_gain: float, seed: int, settings: FitSettings, phases: Phases) -> Diagnosis:
+    given, base = beginning.given, beginning.base
+    asked = Asked(given, least_gain, seed, settings, phases)
+    return (Changes(asked, base) if given.reference else Lacks(asked, base)).diagnosis()

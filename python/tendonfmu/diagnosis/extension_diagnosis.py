@@ -13,7 +13,8 @@ from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.answer import Asked, Compared, answered, cause_of, not_taken, reported
 from tendonfmu.diagnosis.base import Base, refitted
 from tendonfmu.diagnosis.contact_scan import detection_gain, event_gain, events_of, without_events
-from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION, COMMON, OF_LAW, Term, Where
+from tendonfmu.diagnosis.delay import DELAY
+from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION, OF_LAW, Place, Term, Where
 from tendonfmu.diagnosis.effects.places import law_of, thresholds
 from tendonfmu.diagnosis.extension_fit import (
     PRESLIDING,
@@ -32,6 +33,7 @@ from tendonfmu.diagnosis.samples import Samples, Span, as_described, span_of
 from tendonfmu.diagnosis.search import ExtensionSearch, calibrated, search, terms_of
 from tendonfmu.diagnosis.selection import SIGNIFICANCE, Judged, confirmed, invisible_effects, names_needed, step_p_value
 from tendonfmu.estimate import SCALING
+from tendonfmu.model import extended_row
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import Interval
 
@@ -41,7 +43,7 @@ from tendonfmu.statistics import Interval
 # Of the rms that a memory explains: another form of it explains so much more. What depends on the same motions and
 # loads as friction, or scales the torque, resembles that.
 FORM = 0.07
-LIKE_A_LAW = {*OF_LAW, *SCALING} - {*COMMON}
+LIKE_A_LAW = {*OF_LAW, *SCALING}
 
 
 @dataclass(frozen=True)
@@ -102,6 +104,7 @@ class _Bench:
             self._full, self.nominal = (
                 refitted(model, self._samples, self._settings) for model in (self._full, self.nominal)
             )
+        self._judged = [(each, each.tracked) for each in tests] or [(each, each.held_out) for each in training]
         self._unseen = Unseen(self.nominal.data, training, tests, self._settings.threads)
         self._predicted = self._samples.at_predicted_forces(self._full.data)
         self._fits: dict[frozenset[int], FittedModel] = {frozenset(map(id, terms_of(found.causes))): self._full}
@@ -120,7 +123,7 @@ class _Bench:
                 if not (
                     cause.gain.low > 0.0
                     and cause.gain.value >= least_gain * needed[k]
-                    and (shares[k] >= FORM or cause.effect not in LIKE_A_LAW)
+                    and (shares[k] >= FORM or cause.effect not in LIKE_A_LAW or self._is_of_positions(cause))
                     and self._found.base.least.shows_all(cause.effect, cause.terms, fit.data)
                 )
             ]
@@ -168,9 +171,17 @@ class _Bench:
         of_memory = sum(own for own, cause in zip(explained, causes, strict=True) if cause.effect == PRESLIDING)
         return [float(np.sqrt(own / of_memory)) if of_memory else np.inf for own in explained]
 
+    def _is_of_positions(self, cause: Judged) -> bool:
+        """Return whether a cause is a delay that positions show."""
+        return cause.effect == DELAY.name and self._found.base.positions.delay is not None
+
     def with_gain(self, cause: Judged, without: FittedModel, model: FittedModel) -> Judged:
         """Return a cause with its gain; one of the base has the p-value of that gain."""
         cause = replace(cause, gain=self._unseen.gain(without.data, model.data, self._seed))
+        if self._is_of_positions(cause):
+            late = (extended_row(model.data, DELAY.name, Place()) or {}).get("delay", 0.0)
+            shown = self._found.base.positions.gain(self._judged, late, self._seed)
+            cause = replace(cause, gain=shown, gain_unit="m") if shown.value > cause.gain.value else cause
         if cause.p_value < SIGNIFICANCE:
             return cause
         squares = [self._unseen.squares(each.data) for each in (without, model)]

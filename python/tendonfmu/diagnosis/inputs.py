@@ -5,7 +5,7 @@ Recordings of a reference and of now that cannot be compared are refused, or a w
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
@@ -20,6 +20,7 @@ from tendonfmu.recordings import (
     UNFIT_FOR_SEARCH,
     FitRecording,
     Held,
+    Recording,
     RecordingSource,
     admit,
     listed_sources,
@@ -56,6 +57,20 @@ class Input:
             replace(recording, train=recording.train | recording.held_out, held_out=none)
             for recording, none in zip(self.training, nothing, strict=True)
         ]
+
+    def of_finger(self, finger: Finger, seen: Callable[[Recording], Recording] = lambda recording: recording) -> Input:
+        """Return the input of another description, with recordings as `seen` changes them."""
+
+        def again(old: FitRecording) -> FitRecording:
+            new = prepare(finger, seen(old.recording), old.kinematics, Held())
+            return replace(new, train=old.train, held_out=old.held_out, contact_out=old.contact_out)
+
+        return replace(
+            self,
+            finger=finger,
+            training=[again(each) for each in self.training],
+            tests=[again(each) for each in self.tests],
+        )
 
 
 Sources: TypeAlias = "RecordingSource | Sequence[RecordingSource]"

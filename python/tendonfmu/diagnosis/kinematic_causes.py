@@ -37,7 +37,7 @@ from tendonfmu.diagnosis.tendon_equation import (
     rows_of,
 )
 from tendonfmu.model import finger_from_data, moment_arms
-from tendonfmu.recordings import FitRecording, Held, Learned, TendonRouting, learn_routing, prepare, varying_sentences
+from tendonfmu.recordings import Learned, TendonRouting, learn_routing, varying_sentences
 from tendonfmu.statistics import Interval
 
 # --- in words ---------------------------------------------------------------------------------------------------------
@@ -104,16 +104,7 @@ class KinematicCauses:
             moved = tuple(off for off in moved if off.where.effect == ENCODER)
         before = Geometry.of(finger.data)
         now = before.moved(moved)
-
-        def again(recordings: Sequence[FitRecording]) -> list[FitRecording]:
-            whole = [prepare(finger, before.seen(each.recording, now), each.kinematics, Held()) for each in recordings]
-            flags = ("train", "held_out", "contact_out")
-            return [
-                replace(new, **{name: getattr(old, name) for name in flags})
-                for new, old in zip(whole, recordings, strict=True)
-            ]
-
-        return replace(given, finger=finger, training=again(given.training), tests=again(given.tests))
+        return given.of_finger(finger, lambda recording: before.seen(recording, now))
 
     def edited(self, data: Data) -> dict[str, Any]:
         """Return a description with the numbers that are off; none is an encoder's."""
@@ -248,16 +239,21 @@ def _listed(data: Data, learned: Sequence[TendonRouting]) -> Iterator[Off]:
 
 
 def _zero(routing: TendonRouting) -> tuple[Learned, float]:
-    """Return a tendon's zero, and the force (N) about which its spring is off.
+    """Return the zero of a tendon, and the force (N) about which its spring is off.
 
-    A spring may be off from no force on, or, where it is not linear, about the force in the middle of the motion. Of
-    both, the zero that is less off is the simpler answer.
+    A spring may be off from no force on; or about the force in the middle of the motion; or it stiffens from no force
+    on: then the chord k·e + h·e² and its slope agree near the middle of both. With the simplest answer the zero is
+    least off.
     """
     zero, spring, force = routing.zero, routing.stiffness, float(routing.span[0, -1])
-    off = zero.off + force * (1.0 / spring.value - 1.0 / spring.described)
-    if not spring.is_known or abs(off) >= abs(zero.off):
+    now, described = spring.value, spring.described
+    if not spring.is_known:
         return zero, 0.0
-    return replace(zero, value=zero.described + off, p_value=_p_value(off, zero.half)), force
+    centres = [0.0, force, *([force * described / (described + now)] if now > described else [])]
+    off, centre = min(
+        ((zero.off + f * (1.0 / now - 1.0 / described), f) for f in centres), key=lambda each: abs(each[0])
+    )
+    return replace(zero, value=zero.described + off, p_value=_p_value(off, zero.half)) if centre else zero, centre
 
 
 # --- zeros ------------------------------------------------------------------------------------------------------------

@@ -115,6 +115,11 @@ class Cause:
         return self.where.tendon
 
     @property
+    def has_step(self) -> bool:
+        """Whether the extended model alone has it; both models are corrected for what is off in the kinematics."""
+        return self.gain_unit == "N.m" or self.effect == "time_delay"
+
+    @property
     def parameters(self) -> Parameters:
         """Its numbers in the extended description, of all places: path -> (value, unit)."""
         return {path: number for place in self.places for path, number in place.parameters.items()}
@@ -296,4 +301,4 @@ class Diagnosis:
     @property
     def torque_causes(self) -> tuple[Cause, ...]:
         """The causes that change the modelled torque, in the order of `steps`."""
-        return tuple(cause for cause in self.causes if cause.gain_unit == "N.m")
+        return tuple(cause for cause in self.causes if cause.has_step)

@@ -27,6 +27,7 @@ from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.base import POSITION, Base, refitted, remembering
 from tendonfmu.diagnosis.candidate_columns import EVERYWHERE, Candidate, Proposal
 from tendonfmu.diagnosis.contact_scan import events_of
+from tendonfmu.diagnosis.delay import DELAY
 from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION, Place, Term, Where
 from tendonfmu.diagnosis.extension_fit import (
     REMEMBERING,
@@ -234,12 +235,14 @@ class ExtensionSearch(CauseSearch):
         self.base, self.model, self._least_gain = base, base.model, least_gain
         self.first = base.look(base.nominal, ())  # what the nominal description lacks and leaves
         self.causes = [_of_start(terms) for terms in base.start]
+        self._answered = {DELAY.name} if base.positions.delay is not None else set()  # by other evidence than torque
 
     def run(self, step: Step) -> None:
         self.view = self.base.look(self.model)
         super().run(step)
 
     def _try_next(self, tried: set[str]) -> tuple[Judged, bool] | None:
+        tried = tried | self._answered
         selection = self.view.beside({refused.where for refused in self.refused if refused.effect not in SCALING})
         best = selection.best(self._least_gain, tried)
         together = calibration(self.view, selection, tried, self._least_gain)
@@ -310,7 +313,7 @@ class ExtensionSearch(CauseSearch):
         if gain < LARGE or not memory_of(model.data):
             return model
         described = finger_from_data(model.data, base.settings.path)
-        other, memory = remembering(described, base.nominal, base.samples, base.settings)
+        other, memory = remembering(described, base.nominal, base.samples, base.settings, base.model.fixed)
         if base.left_unseen(other).sum() >= base.left_unseen(model).sum():
             return model
         self.causes = [cause for cause in self.causes if cause.effect not in REMEMBERING]
@@ -320,7 +323,7 @@ class ExtensionSearch(CauseSearch):
     @cached_property
     def small(self) -> list[Judged]:
         """What was refused, and the best place of every other effect that is certain but not material."""
-        selection, known = self.view.selection, {refused.effect for refused in self.refused}
+        selection, known = self.view.selection, {refused.effect for refused in self.refused} | self._answered
         gains = [(cause, *selection.gain(cause)) for cause in selection.ranked(known)]
         named = [self._named(cause, selection) for cause, gain, error in gains if gain > CERTAIN * error]
         return [*self.refused, *(cause for cause in named if cause.p_value < SIGNIFICANCE)]

@@ -127,6 +127,7 @@ class Judged(Candidate):
     covariance: Numbers = field(default_factory=lambda: np.zeros((0, 0)))  # [d, d]
     unseen: Numbers = field(default_factory=lambda: np.zeros(0))  # Σ e² by stretch, (N·m)²
     gain: Interval = NO_GAIN  # 1 − rms with / rms without
+    gain_unit: str = "N.m"  # of the rms
     p_value: float = 1.0  # family-wise
     alike: tuple[Judged, ...] = ()  # what the data cannot distinguish from it, best first
     sensors: tuple[Sensor, ...] = ()  # of `calibration`

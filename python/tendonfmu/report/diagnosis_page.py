@@ -282,7 +282,7 @@ def waterfall_of(diagnosis: Diagnosis, names: Names) -> Waterfall:
     rows = []
     if diagnosis.torque_causes:
         rows.append(Step(f"error of the {words.nominal}", f"{shown[0]:.{digits}f}", (part("nominal", 0.0, steps[0]),)))
-    numbers = [k for k, cause in enumerate(diagnosis.causes, start=1) if cause.gain_unit == "N.m"]
+    numbers = [k for k, cause in enumerate(diagnosis.causes, start=1) if cause.has_step]
     for k, (number, cause) in enumerate(zip(numbers, diagnosis.torque_causes, strict=True)):
         change = shown[k + 1] - shown[k]
         tone, sign = ("cause", "−") if change <= 0 else ("more", "+")

@@ -1,0 +1,108 @@
+"""Whether forces are later than positions: what the tendons' equation says, else what the torque does."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+
+from tendonfmu.arrays import Flags, Numbers
+from tendonfmu.diagnosis.effects import Place, Term, by_name
+from tendonfmu.diagnosis.extension_fit import FittedModel
+from tendonfmu.diagnosis.samples import Samples, shifted
+from tendonfmu.diagnosis.selection import LeastSizes
+from tendonfmu.diagnosis.view import look
+from tendonfmu.model import EFFECT_NUMBERS, Finger, moment_arms
+from tendonfmu.recordings import FitRecording, with_linear_springs
+from tendonfmu.statistics import Interval, blocks_of, gain_interval, variance_between
+
+DELAY = by_name("time_delay")
+LONGEST = EFFECT_NUMBERS["time_delay"]["delay"].most  # s in either direction
+FINE = 0.001  # s
+LARGE = 0.005  # s: smaller delays compete with other causes, by their derivative
+CLEAR_GAIN = 0.1  # of the rms that a starting delay must remove: any other missing effect looks a little like a delay
+CLEAR = 0.25  # error of the best delay, at most, over the median error of all delays
+
+
+HELD = ("extensions[*].delay",)  # what no fit changes where positions show it
+
+
+def late_forces(delay: float, *, fixed: bool = False) -> tuple[Term, ...]:
+    """Return the terms of forces that are `delay` s later than positions."""
+    return (Term(DELAY, Place(), {"delay": delay}, (1.0,), fixed=fixed),)
+
+
+def delay_of_torque(model: FittedModel, samples: Samples, least: LeastSizes) -> tuple[Term, ...]:
+    """Return a delay of forces that is too large for its derivative, beside a fitted model; () if there is none."""
+    if not DELAY.places(model.data, samples.recordings[0].kinematics):
+        return ()
+    # a grid of all delays that a description accepts, including 0
+    grid = max(2 * FINE, float(np.median(np.diff(samples.recordings[0].time))) / 2)
+    delays = grid * np.arange(-int(LONGEST / grid), int(LONGEST / grid) + 1)
+    late = ([shifted(each, each.target, delay) - each.target for each in samples.recordings] for delay in delays)
+    moved = np.stack([samples.grid.means(changes) for changes in late], axis=2)
+    view = look(model.data, samples, least, (), model)
+    errors = view.grams.errors_of(view.series.target[:, :, None] + moved)
+    still, best = int(np.argmin(np.abs(delays))), int(np.argmin(errors))
+    # an optimum at the edge is no minimum; a small delay competes with other causes, by its derivative
+    is_large = 0 < best < len(delays) - 1 and abs(delays[best]) >= LARGE
+    clear = is_large and errors[best] < (1.0 - CLEAR_GAIN) ** 2 * errors[still]
+    return late_forces(float(delays[best])) if clear else ()
+
+
+class Positions:
+    """What positions tell of a delay, whatever friction is.
+
+    With joint encoders, or more tendons than joints, the joint-side positions x0 − f0/k agree with the angles, or with
+    each other, only if positions and forces are of the same time.
+    """
+
+    def __init__(self, finger: Finger, recordings: Sequence[FitRecording]) -> None:
+        self._finger, self._arms = finger, moment_arms(finger.data)
+        self._stiffness = np.array([tendon["stiffness"] for tendon in finger.data["tendons"]])
+        groups = [set(each.recording.groups) for each in recordings]
+        self._measured = all("joint_position" in own for own in groups)
+        self._apart = np.eye(len(self._arms)) - (0.0 if self._measured else self._arms @ np.linalg.pinv(self._arms))
+        tells = all("tendon_position" in own for own in groups) and np.linalg.matrix_rank(self._apart) > 0
+        self.delay = self._found(recordings) if tells else None  # s; None: they do not show whether there is one
+
+    def gain(self, judged: Iterable[tuple[FitRecording, Flags]], delay: float, seed: int) -> Interval:
+        """Return which share of the rms that their equation leaves of some samples a delay removes."""
+        pairs = []
+        for recording, chosen in judged:
+            late = np.array([0.0, delay])
+            squares = [np.zeros(len(recording.time)) for _ in late]
+            for part, left in self._left(recording, late):
+                for whole, own in zip(squares, left, strict=True):
+                    whole[part] = (own**2).sum(axis=1)
+            index = blocks_of(recording.time, chosen)
+            pairs.append(np.column_stack([index.sums(each) for each in squares]))
+        before, after = np.concatenate(pairs).T
+        return gain_interval(before, after, seed, variance_between(pairs) / len(pairs))
+
+    def _found(self, recordings: Sequence[FitRecording]) -> float | None:
+        delays = np.arange(-LONGEST, LONGEST + FINE / 2, FINE)
+        errors = np.zeros(len(delays))
+        for recording in recordings:
+            for _, left in self._left(recording, delays):
+                errors += [float(np.sum(each**2)) for each in left]
+        best = int(np.argmin(errors))
+        if not 0 < best < len(delays) - 1 or errors[best] > CLEAR * float(np.median(errors)):
+            return None
+        before, at, after = errors[best - 1 : best + 2]
+        return float(delays[best] + FINE * 0.5 * (before - after) / max(before - 2 * at + after, 1e-300))
+
+    def _left(self, recording: FitRecording, delays: Numbers) -> Iterator[tuple[slice, Iterator[Numbers]]]:
+        """Yield each part, and what the equation leaves of it with each delay, less its mean (m)."""
+        groups = recording.recording.groups
+        position = groups["tendon_position"] - (groups["joint_position"] @ self._arms.T if self._measured else 0.0)
+        linear = with_linear_springs(self._finger, recording.recording).groups["tendon_position"]
+        stretch = groups["tendon_force"] / self._stiffness + (groups["tendon_position"] - linear)
+        for part in recording.parts:
+            own = recording.time[part], position[part], stretch[part]
+            yield part, (self._apart_at(*own, delay) for delay in delays.tolist())
+
+    def _apart_at(self, time: Numbers, position: Numbers, stretch: Numbers, delay: float) -> Numbers:
+        late = [np.interp(time - delay, time, column) for column in position.T]
+        left = (np.stack(late, axis=1) - stretch) @ self._apart
+        return np.asarray(left - left.mean(axis=0))
