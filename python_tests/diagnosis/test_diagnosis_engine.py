@@ -181,6 +181,16 @@ def test_a_search_starts_at_the_true_delay(samples: int, source: int) -> None:
     assert found == pytest.approx(samples / RATE, abs=0.6 / RATE)
 
 
+def test_positions_set_a_described_delay() -> None:
+    """Friction that remembers imitates a delay, so no fit moves it."""
+    made = recorded(finger(), 24, 1, 20.0, 4)
+    data = finger() | {"extensions": [{"effect": "time_delay", "delay": 0.004}]}
+    base = find_base(described(data), [made], FitSettings(threads=1), 0.03)
+    for model in (base.nominal, base.model):
+        (late,) = [row["delay"] for row in model.data["extensions"] if row["effect"] == "time_delay"]
+        assert late == base.positions.delay == pytest.approx(4 / RATE, abs=5e-4)
+
+
 def test_the_same_reference_is_fitted_once(hidden: FitRecording, monkeypatch: pytest.MonkeyPatch) -> None:
     """A history asks for it with every recording."""
     asked = []

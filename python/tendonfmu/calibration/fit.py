@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from tendonfmu.detect import sample_seconds
-from tendonfmu.diagnosis import Event, Samples, events_of, without_events
+from tendonfmu.diagnosis import Event, Samples, events_of, held_delay, without_events
 from tendonfmu.estimate import (
     FIT_REPORT,
     Choice,
@@ -57,7 +57,7 @@ def fit_all(finger: Finger, recordings: Sequence[FitRecording], *, threads: int,
         return CalibratedFit(finger, (), ())
     events, _ = events_of(finger.data, Samples.of(finger.data, recordings, threads), seed)
     kept = [without_events(recording, events) for recording in recordings]
-    structure = build_structure(finger, Choice(fix=torque_scales(finger.data)))
+    structure = build_structure(finger, Choice(fix=(*torque_scales(finger.data), *held_delay(finger.data))))
     settings = replace(settings_of(finger.data, kept, threads), near=True)
     learned = learn_batch(structure, kept, Watch(None), settings)
     result = with_learned_numbers(structure, learned, learned.fitted(structure))

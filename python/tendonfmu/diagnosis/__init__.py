@@ -1,6 +1,7 @@
 """Find what a model gets wrong, which cause it has, and what correcting it gains (`tendonfmu diagnose`).
 
-- `inputs` reads and checks recordings; `base` settles delay, position-dependent torque and memory.
+- `inputs` reads and checks recordings; `kinematic_causes` and `force_gains` find what positions show.
+- `base` settles `delay`, position-dependent torque and memory.
 - `samples` is what runs of the core are compared with, and its signals; `view` turns both into columns.
 - A mechanism (`effects`) at a place is a candidate (`candidate_columns`), with gain and certainty it is judged
   (`selection`), with its numbers a cause (`result`).
@@ -15,6 +16,7 @@ from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from .contact_scan import events_of, without_events
+    from .delay import held_delay
     from .diagnosis import diagnose
     from .effects.mechanism import Where
     from .effects.places import thresholds

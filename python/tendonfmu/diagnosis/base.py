@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tendonfmu.arrays import Data, Flags, Numbers
-from tendonfmu.diagnosis.delay import DELAY, HELD, Positions, delay_of_torque, late_forces
+from tendonfmu.diagnosis.delay import DELAY, Positions, delay_of_torque, held_delay, late_forces
 from tendonfmu.diagnosis.effects import MECHANISMS, Mechanism, Term, Where, by_name
 from tendonfmu.diagnosis.extension_fit import (
     FitSettings,
@@ -110,12 +110,13 @@ def _found_base(
     least_gain: float,
     known: Sequence[tuple[Term, ...]],
 ) -> Base:
+    positions = Positions(given, recordings)
+    given, held = _with_shown_delay(given, positions)
     samples = Samples.of(given.data, recordings, settings.threads)
-    nominal = fit_numbers(given.data, samples, settings)
+    nominal = fit_numbers(given.data, samples, settings, fixed=held)
     samples = samples.as_rests_demand(nominal.data)
     nominal = refitted(nominal, samples, settings)
     least = least_sizes(given.data, recordings, float(np.median(np.diff(recordings[0].time))))
-    positions = Positions(given, samples.recordings)
     late: tuple[Term, ...] = ()
     is_new = bool(DELAY.places(nominal.data, samples.recordings[0].kinematics))
     if is_new and positions.delay is not None and abs(positions.delay) >= least.least(Where(DELAY.name)):
@@ -129,6 +130,16 @@ def _found_base(
         if others[0].cost < model.cost:
             (model, memory), start = others, [*start, late]
     return Base(samples, least, nominal, (*start, *memory), model, settings, positions)
+
+
+def _with_shown_delay(given: Finger, positions: Positions) -> tuple[Finger, tuple[str, ...]]:
+    """Return the finger with a described delay as positions show it, and what the fits leave of it."""
+    if positions.delay is None or not (held := held_delay(given.data)):
+        return given, ()
+    rows = [
+        {**row, "delay": positions.delay} if row["effect"] == DELAY.name else row for row in given.data["extensions"]
+    ]
+    return given.with_data({**given.data, "extensions": rows}), held
 
 
 # --- position-dependent torque ----------------------------------------------------------------------------------------
@@ -151,8 +162,9 @@ def _with_memory(
 ) -> tuple[FittedModel, list[tuple[Term, ...]]]:
     """Return the model with the memory that recordings choose, and the terms of it that the description lacks."""
     described = extended_description(nominal.data, [term for terms in start for term in terms])
-    fixed = HELD if any(term.fixed for terms in start for term in terms) else ()
-    return remembering(replace(given, data=described), nominal, samples, settings, fixed)
+    is_held = nominal.fixed or any(term.fixed for terms in start for term in terms)
+    held = held_delay(described) if is_held else ()
+    return remembering(replace(given, data=described), nominal, samples, settings, held)
 
 
 def remembering(

@@ -267,6 +267,7 @@ def fit_extended(
     added = zip(causes, added_paths(nominal.data, causes), strict=True)
     estimated = {number.path for number in unknowns(data)}
     fixed = tuple(path for cause, paths in added if cause.fixed for path in paths if path in estimated)
+    fixed = (*nominal.fixed, *fixed)
     if begin is not None:
         data = carried(data, begin.data)
     return fit_numbers(data, samples, settings, given=nominal.given, fixed=fixed, rough=rough)
