@@ -340,7 +340,7 @@ class _Run:
         """Fit with the previous numbers as the prior; keep those if new ones are no better on motion set apart."""
         case, inner = self._case, self._most()
         most = self._fitted_again([without_held_out(each.recording, HELD) for each in case.free])
-        before, after = (unseen_square(each.data, inner) for each in (case.finger, most.finger))
+        before, after = (unseen_square(each, inner) for each in (case.finger, most.finger))
         if after <= before:
             whole = self._fitted_again([each.recording for each in case.free])
             return {"finger": whole.finger.data, "most": most.finger.data, "warnings": list(whole.warnings)}

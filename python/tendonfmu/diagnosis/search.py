@@ -49,7 +49,7 @@ from tendonfmu.diagnosis.selection import (
 )
 from tendonfmu.diagnosis.view import View
 from tendonfmu.estimate import SCALING
-from tendonfmu.model import finger_from_data, moment_arms
+from tendonfmu.model import Finger, moment_arms
 from tendonfmu.statistics import Interval
 from tendonfmu.tasks import Phases, Step
 
@@ -309,7 +309,7 @@ class ExtensionSearch(CauseSearch):
         base = self.base
         if gain < LARGE or not memory_of(model.data):
             return model
-        described = finger_from_data(model.data, base.settings.path)
+        described = Finger(base.settings.path, model.data)
         other, memory = remembering(described, base.nominal, base.samples, base.settings)
         if base.left_unseen(other).sum() >= base.left_unseen(model).sum():
             return model

@@ -10,7 +10,7 @@ from typing import Any, Literal, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.arrays import Data, Numbers
+from tendonfmu.arrays import Numbers
 from tendonfmu.estimate.core_runs import CoreRuns, SlowDrift
 from tendonfmu.estimate.estimation import Unknown
 from tendonfmu.estimate.files import FIT_REPORT
@@ -27,7 +27,7 @@ from tendonfmu.estimate.learning import Learned, unknown_names
 from tendonfmu.estimate.verdicts import CAUSES, Fitted
 from tendonfmu.files import counted, finite
 from tendonfmu.json_types import Values
-from tendonfmu.model import Effect, Finger, Law, without_friction
+from tendonfmu.model import Effect, Finger, Law, finger_of, without_friction
 from tendonfmu.recordings import FitRecording, Model, RoutingEntry, consistency, rms, whiteness
 from tendonfmu.statistics import effective_samples
 
@@ -45,7 +45,7 @@ class Evaluation:
     model_only: Numbers  # [N, n] y − T less a constant per part (N·m)
 
 
-def evaluate(start: Data, fitted: Data, recording: FitRecording) -> Evaluation:
+def evaluate(start: Finger, fitted: Finger, recording: FitRecording) -> Evaluation:
     """Judge a fitted finger on a recording."""
     model = recording.run(fitted)
     rest = recording.target - model.torque
@@ -53,7 +53,8 @@ def evaluate(start: Data, fitted: Data, recording: FitRecording) -> Evaluation:
         chosen = recording.train[part] if recording.train[part].any() else recording.tracked[part]
         if chosen.any():
             rest[part] -= rest[part][chosen].mean(axis=0)
-    return Evaluation(recording, model, recording.run(start), recording.run(without_friction(fitted)), rest)
+    bare = finger_of(without_friction(fitted.data))
+    return Evaluation(recording, model, recording.run(start), recording.run(bare), rest)
 
 
 def residual_entry(evaluations: Sequence[Evaluation], which: str) -> ResidualRms | None:
@@ -211,12 +212,12 @@ def noise_sentences(innovations: Innovations) -> list[str]:
 FAR, MOST_NAMED = 2.0, 4  # a factor by which a number moves far, and such numbers named at most
 
 
-def unseen_square(data: Data, recordings: Sequence[FitRecording]) -> float:
+def unseen_square(finger: Finger, recordings: Sequence[FitRecording]) -> float:
     """Return Σ r² over the samples held out and all joints, (N·m)², without a learning bias; 0 without any."""
     unseen = [replace(recording, train=recording.held_out) for recording in recordings if recording.held_out.any()]
     if not unseen:
         return 0.0
-    runs = CoreRuns(data, unseen)
+    runs = CoreRuns(finger, unseen)
     return float(np.sum(SlowDrift(runs.time, runs.stretch, runs.used).without(runs.residual()) ** 2))
 
 

@@ -34,7 +34,7 @@ from tendonfmu.estimate.fit_report import (
     noise_sentences,
     unseen_square,
 )
-from tendonfmu.estimate.identifiability import EffectCoverage, coverage_of, with_laws_of
+from tendonfmu.estimate.identifiability import EffectCoverage, coverage_of
 from tendonfmu.estimate.learning import FrictionFitOptions, Interrupted, Learned, Watch, settings_of
 from tendonfmu.estimate.memory_choice import Remembered, learn_remembered
 from tendonfmu.estimate.methods import learn_batch, learn_ekf
@@ -208,15 +208,14 @@ class FrictionFit(Configured):
 
     def _evaluated(self, learned: Learned) -> list[Evaluation]:
         self.description_ = learned.fitted(self.structure_)
-        start, fitted = self.start_.data, self.description_.data
-        return [evaluate(start, fitted, recording) for recording in self.recordings_]
+        return [evaluate(self.start_, self.description_, recording) for recording in self.recordings_]
 
     def _conclude(self, learned: Learned, compared: list[FitRecording], remarks: list[str], is_estimated: bool) -> None:
         self.training_ = self._evaluated(learned)
         if learned.memory is None:
             keeps = is_worse(self.training_)
         else:
-            before, after = (unseen_square(each.data, self.recordings_) for each in (self.start_, self.description_))
+            before, after = (unseen_square(each, self.recordings_) for each in (self.start_, self.description_))
             keeps = after > before
         if keeps:
             learned = replace(learned, z=learned.estimator.start)
@@ -225,7 +224,7 @@ class FrictionFit(Configured):
         self.numbers_, self.covariance_ = self._judged(learned)
         self.parameters_ = {number.number.path: number.value for number in self.numbers_}
         self.standard_errors_ = {number.number.path: number.standard_error for number in self.numbers_}
-        self.comparisons_ = [evaluate(self.start_.data, self.description_.data, recording) for recording in compared]
+        self.comparisons_ = [evaluate(self.start_, self.description_, recording) for recording in compared]
         numbers, noise = [each.number for each in self.numbers_], number_of(self.description_.data, "bias.noise_std")
         self.description_ = with_estimates(self.description_, numbers, self.covariance_, sizes_of(numbers, noise))
         self.converged_, self.n_iter_, self.cost_ = learned.converged, learned.iterations, learned.cost
@@ -253,9 +252,8 @@ class FrictionFit(Configured):
         self.finished_ = True
 
     def _judged(self, learned: Learned) -> tuple[list[Fitted], Numbers]:
-        data = self.description_.data
-        coverage = with_laws_of(data, self.coverage_)
-        return judge_numbers(self.structure_, learned, self.description_, coverage, number_of(data, "bias.noise_std"))
+        noise = number_of(self.description_.data, "bias.noise_std")
+        return judge_numbers(self.structure_, learned, self.description_, self.coverage_, noise)
 
     # --- what was learned, on other recordings ------------------------------------------------------------------------
 
@@ -280,7 +278,7 @@ class FrictionFit(Configured):
     def _left(self, source: RecordingSource) -> tuple[FitRecording, Numbers]:
         self._require_fitted()
         prepared = self._prepared(source, Held())
-        return prepared, prepared.run(self.description_.data).residual
+        return prepared, prepared.run(self.description_).residual
 
     def _require_fitted(self) -> None:
         if not getattr(self, "finished_", False):

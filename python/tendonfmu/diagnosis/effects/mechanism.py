@@ -16,9 +16,8 @@ from typing import Any, NamedTuple
 from tendonfmu.arrays import Data
 from tendonfmu.diagnosis.samples import Span
 from tendonfmu.errors import InputError
-from tendonfmu.estimate import MAGNITUDES
 from tendonfmu.files import counted
-from tendonfmu.model import get_number, law_path, own_copy, set_number
+from tendonfmu.model import LAW_NUMBERS, get_number, law_path, own_copy, set_number
 
 # --- changes of a description -----------------------------------------------------------------------------------------
 # An absent law gets a negligible friction, because the estimator refuses a law without any. A law that is split into
@@ -153,7 +152,7 @@ def raise_to(data: dict[str, Any], path: str, share: float) -> None:
 
 def magnitudes_of(side: Mapping[str, Any]) -> tuple[float, float, float]:
     """Return Coulomb friction, static − coulomb and viscous friction of a side."""
-    static, coulomb, _, viscous = (float(side.get(key) or 0.0) for key in MAGNITUDES)
+    static, coulomb, _, viscous = (float(side.get(key) or 0.0) for key in LAW_NUMBERS)
     return coulomb, static - coulomb, viscous
 
 
