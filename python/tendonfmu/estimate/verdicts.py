@@ -55,7 +55,7 @@ class Fitted:
 def slopes(estimator: Estimator, z: Numbers) -> Numbers:
     """Compute [p, u] the derivatives of all numbers of the description by the unknowns, for the delta method."""
     # The map is static = coulomb + drop and vs = 1/rate. The derivatives are its finite differences within the bounds.
-    base = np.asarray(estimator.values(z))
+    base = estimator.values(z)
     columns = []
     for k, unknown in enumerate(estimator.unknowns):
         # a step of a small drop must change static = coulomb + drop, however large coulomb is
@@ -64,7 +64,7 @@ def slopes(estimator: Estimator, z: Numbers) -> Numbers:
         step = -step if z[k] + step > unknown.upper else step
         moved = z.copy()
         moved[k] += step
-        columns.append((np.asarray(estimator.values(moved)) - base) / step)
+        columns.append((estimator.values(moved) - base) / step)
     return np.column_stack(columns)
 
 
@@ -80,7 +80,7 @@ def judge_numbers(
         np.sqrt(np.maximum(np.diag(each), 0.0)) for each in (covariance, matrix @ learned.prior @ matrix.T)
     )
     size = sizes_of(numbers, noise)
-    columns = _columns(structure, estimator)
+    columns, unknowns = _columns(structure, estimator), estimator.unknowns
     representatives = _representatives(numbers, columns, coverage)
     # `error` from all numbers, `error_alone` with all others known
     chosen = covariance[np.ix_(representatives, representatives)]
@@ -107,7 +107,7 @@ def judge_numbers(
                 number=number,
                 start=given.value,
                 standard_error=float(error[k]),
-                at_bound=_bound(estimator.unknowns[columns[k]], float(z[columns[k]])),
+                at_bound=_bound(unknowns[columns[k]], float(z[columns[k]])),
                 cause=cause,
                 reason=CAUSES[kept] if cause == "kept" else verdict.reason if cause else "",
                 advice=_advice(cause, verdict, cover, finger) if cause not in ("", "kept") else "",

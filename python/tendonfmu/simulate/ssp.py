@@ -10,7 +10,7 @@ inputs.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -41,8 +41,11 @@ from tendonfmu.fmu import (
     xml_text,
 )
 from tendonfmu.model import INPUTS, native, read_finger
-from tendonfmu.simulate.plant import Plant, Settings, refused_by
+from tendonfmu.simulate.plant import refused_by
 from tendonfmu.simulate.rig import Rig, plant_of, read_rig
+
+if TYPE_CHECKING:
+    from tendonfmu._plant import Settings
 
 # --- packing ----------------------------------------------------------------------------------------------------------
 # The binary is the same for every rig; the rig is a resource. The same input gives the same bytes. No compiler is
@@ -70,7 +73,7 @@ def plant_members(rig: Rig, *, binaries: Path | None = None) -> dict[str, bytes]
     table = read_table(package_file("model_description/plant_variables.json").read_text(encoding="utf-8"))
     identifier = f"TendonFinger_{model_identifier(rig.name)}"
     context: dict[str, Any] = {
-        **describe_plant(rig, _settings(rig, text), table),
+        **describe_plant(rig, _settings(rig), table),
         "model_identifier": identifier,
         "guid": guid(text, table),
         "version": native.version(),
@@ -87,10 +90,9 @@ def plant_members(rig: Rig, *, binaries: Path | None = None) -> dict[str, bytes]
     }
 
 
-def _settings(rig: Rig, text: bytes) -> Settings:
+def _settings(rig: Rig) -> Settings:
     """Return the rig's own settings, from a plant that has accepted it."""
-    with refused_by(rig.path):
-        settings = Plant(text).settings
+    settings = plant_of(rig).settings
     if settings.seed > LARGEST_SEED:
         raise InputError(
             f"{rig.path}: seed = {settings.seed}: expected at most {LARGEST_SEED} in an FMU, whose Integer has 32 bits"
@@ -196,7 +198,7 @@ def system_structure(rig: Rig) -> bytes:
             SSD.System(
                 SSD.Elements(component(PLANT, PLANT_FMU, plant), component(FRICTION, FRICTION_FMU, friction)),
                 SSD.Connections(*(connection(PLANT, name, FRICTION, name) for name in coupled)),
-                SSD.Annotations(_master_of_omsimulator(_relative_tolerance(rig))),
+                SSD.Annotations(_master_of_omsimulator(plant_of(rig).settings.relative_tolerance)),
                 name="finger",
             ),
             SSD.DefaultExperiment(startTime="0.0", stopTime=str(DURATION if rig.duration is None else rig.duration)),
@@ -218,12 +220,6 @@ def start_values(rig: Rig) -> bytes:
         for i, value in enumerate(signals[f"measured_{group}"][0], start=1)
     }
     return parameter_values("start_values", values)
-
-
-def _relative_tolerance(rig: Rig) -> float:
-    """Return the rig's tolerance, which is that of the plant's default experiment."""
-    with refused_by(rig.path):
-        return float(plant_of(rig).settings.relative_tolerance)
 
 
 def _master_of_omsimulator(tolerance: float) -> Any:
