@@ -22,8 +22,6 @@ from tendonfmu.model import (
     friction_probe,
     native,
     number_of,
-    steps_of,
-    working_point_weights,
 )
 
 Progress = Callable[[int, int], None]
@@ -35,48 +33,6 @@ _ELEMENTS = 4_000_000  # sensitivities in memory at a time
 # --- sensitivities ----------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class _Bundle:
-    """Numbers that one run changes together, because their effects can be separated afterwards."""
-
-    members: list[Number]
-    columns: list[int]
-
-    @property
-    def steps(self) -> list[tuple[str, float]]:
-        """Paths, and what is added to each."""
-        return [(path, _sign(number) * STEP * number.reference) for number in self.members for path in number.paths]
-
-    def shares(self, joint_position: Numbers) -> Iterator[tuple[int, Number, slice, Numbers]]:
-        """Yield (column, number, its joints as a slice, [N, 1] 1 where the change of a sample is due to the number)."""
-        effect = self.members[0].effect
-        active = np.ones((len(joint_position), len(self.members)))
-        if effect is not None and len(effect.angles) > 1:
-            weights = working_point_weights(effect, joint_position)
-            active = (weights[:, [number.point for number in self.members]] > 0).astype(float)
-        for k, (column, number) in enumerate(zip(self.columns, self.members, strict=True)):
-            joint = _joint_of(number)
-            yield column, number, slice(joint, None if joint is None else joint + 1), active[:, k : k + 1]
-
-
-def _bundles(numbers: Sequence[Number]) -> list[_Bundle]:
-    groups: dict[str, list[int]] = {}
-    for column, number in enumerate(numbers):
-        name = number.path
-        if _joint_of(number) is not None:
-            name = number.path.split(".", 1)[1]
-        elif number.effect is not None and len(number.effect.angles) > 1:
-            name = f"{number.effect.path}{number.path.split(']')[-1]} {number.point % 2}"
-        groups.setdefault(name, []).append(column)
-    return [_Bundle([numbers[k] for k in columns], columns) for columns in groups.values()]
-
-
-def _joint_of(number: Number) -> int | None:
-    """Return the joint, from 0, whose own friction or cover the number belongs to, else None."""
-    owner, index, *_ = steps_of(number.path)
-    return index if owner == "joints" and isinstance(index, int) else None
-
-
 def _sign(number: Number) -> int:
     """Return the direction of the step: coulomb friction and delays step down, since both have an upper limit."""
     down = number.key == "delay" or (number.key == "coulomb" and number.with_path is None)
@@ -84,11 +40,13 @@ def _sign(number: Number) -> int:
 
 
 class _Run:
-    """A finger with some numbers changed, advanced over a motion part by part."""
+    """A finger with a number changed, advanced over a motion part by part."""
 
-    def __init__(self, finger: native.Instance, steps: Sequence[tuple[str, float]]) -> None:
-        plain = {path: finger.get(path) for path, _ in steps}
-        finger.set({path: plain[path] + step for path, step in steps})
+    def __init__(self, finger: native.Instance, number: Number | None = None) -> None:
+        self.step = STEP if number is None else _sign(number) * STEP  # relative
+        plain = {} if number is None else {path: finger.get(path) for path in number.paths}
+        step = 0.0 if number is None else self.step * number.reference
+        finger.set({path: value + step for path, value in plain.items()})
         self._state = finger.save_state()
         finger.set(plain)
         self._bias = np.zeros((1, finger.joints))
@@ -111,8 +69,7 @@ def sensitivities(
     # motion: [N] (s); returns [S, n, p] of successive parts of the motion (N·m)
     finger = friction_probe(described)
     samples, joints = motion["joint_position"].shape
-    bundles = _bundles(numbers)
-    base, runs = _Run(finger, ()), [_Run(finger, bundle.steps) for bundle in bundles]
+    base, runs = _Run(finger), [_Run(finger, number) for number in numbers]
     held = np.zeros((joints, len(numbers)))  # by the bias, from the parts before
     length = max(200, _ELEMENTS // (joints * max(len(numbers), 1)))
     starts = range(0, samples, length)
@@ -120,29 +77,14 @@ def sensitivities(
         part = {name: values[begin : begin + length] for name, values in motion.items()}
         plain = base.advance(finger, part)
         changes = np.zeros((len(part["time"]), joints, len(numbers)))
-        for done, (bundle, run) in enumerate(zip(bundles, runs, strict=True), start=1):
-            moved = run.advance(finger, part)
-            _share_out(bundle, moved, plain, part["joint_position"], changes, held)
+        for k, run in enumerate(runs):
+            torque, jump = ((new - old) / run.step for new, old in zip(run.advance(finger, part), plain, strict=True))
+            bias = held[:, k] + np.cumsum(jump, axis=0)
+            changes[:, :, k] = torque + bias
+            held[:, k] = bias[-1]
             if progress is not None:
-                progress(number * len(bundles) + done, len(starts) * len(bundles))
+                progress(number * len(runs) + k + 1, len(starts) * len(runs))
         yield changes
-
-
-def _share_out(
-    bundle: _Bundle,
-    moved: tuple[Numbers, Numbers],
-    plain: tuple[Numbers, Numbers],
-    joint_position: Numbers,
-    changes: Numbers,
-    held: Numbers,
-) -> None:
-    """Write the columns of a bundle into `changes`, and what its bias holds at the end into `held`."""
-    torque, jump = ((new - old) / STEP for new, old in zip(moved, plain, strict=True))
-    for column, number, joint, active in bundle.shares(joint_position):
-        sign = _sign(number)
-        bias = held[joint, column] + sign * np.cumsum((active * jump)[:, joint], axis=0)
-        changes[:, joint, column] = sign * (active * torque)[:, joint] + bias
-        held[joint, column] = bias[-1]
 
 
 # --- information ------------------------------------------------------------------------------------------------------
