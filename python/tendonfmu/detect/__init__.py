@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from .score_types import ScoreReport
     from .scoring import Scored, Track, run_track, score_recordings
     from .summary import RocPoint, Summary
-    from .tune_types import TuneReport
+    from .tune_report import TuneReport
     from .tuning import ContactTuning, NotEnough, TuneWarning
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

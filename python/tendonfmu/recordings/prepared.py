@@ -25,7 +25,7 @@ from tendonfmu.model import (
     velocity_threshold,
     watches_motors,
 )
-from tendonfmu.recordings.entry_types import RecordingEntry
+from tendonfmu.recordings.columns import RecordingEntry
 from tendonfmu.recordings.faults import SETTLING, gap_sentences, gaps, rate_sentences, silent_tendons, stuck_sensors
 from tendonfmu.recordings.recording import Recording, check_numbers
 from tendonfmu.recordings.residuals import Model, run_parts

@@ -14,7 +14,7 @@ from scipy.special import chdtrc, gammaincinv
 
 from tendonfmu.arrays import Data, Flags, Numbers
 from tendonfmu.model import Finger, moment_arms
-from tendonfmu.recordings.entry_types import Nis, Whiteness
+from tendonfmu.recordings.columns import Nis, Whiteness
 
 LAGS = 20  # of the Ljung-Box test
 CONFIDENCE = 0.95

@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from tendonfmu import fmu
-from tendonfmu.commands.hand.description import Hand, HandPart
-from tendonfmu.commands.hand.hand_types import WRIST
+from tendonfmu.commands.hand.description import WRIST, Hand, HandPart
 from tendonfmu.commands.hand.recordings import HandRecording, split_parts
 from tendonfmu.files import whole_file
 
