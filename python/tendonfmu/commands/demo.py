@@ -205,10 +205,10 @@ class Story:
         self.files |= reporting.write_score_figures(after.scored, self.folder / "score")
         tile = reporting.Tile(f"{after.found} of {after.events}", "", "pushes found, without a touch sensor")
         as_given = f"as given: {before.found} of {before.events} pushes found"
-        lines = [*reporting.detection.score_lines(after.report), as_given]
+        lines = [*reporting.detection.score_lines(after.scored), as_given]
         sheet = next(reporting.score_sheets(after.scored))
         return Chapter(
-            "detect", tile, list(reporting.detection.score_tables(after.report)), lines, [sheet], "score/score.html"
+            "detect", tile, list(reporting.detection.score_tables(after.scored)), lines, [sheet], "score/score.html"
         )
 
     def _run(self, data: Path, phase: Phase) -> Chapter:
