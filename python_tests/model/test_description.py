@@ -193,7 +193,7 @@ def test_the_index_finger_has_the_papers_472_numbers() -> None:
     """And a pretension that pulls all tendons, none of which rubs beyond its last joint."""
     finger = read_finger(INDEX_FINGER)
     counts = count(finger)
-    assert (counts.joints, counts.tendons, counts.pulleys, counts.edges) == (4, 8, 14, 22)
+    assert (finger.joints, finger.tendons, counts.pulleys, counts.edges) == (4, 8, 14, 22)
     assert counts.laws == {"friction": 4, "load_friction": 4, "pulley_friction": 14, "edge_friction": 94}
     assert sum(counts.estimated_numbers.values()) == 472
     assert counts.asymmetric_laws == 0 and counts.extensions == []

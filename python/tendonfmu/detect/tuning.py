@@ -1,4 +1,4 @@
-"""Tunes contact detection on free motion for a stated rate of false alarms, with an interface like scikit-learn's.
+"""Tunes contact detection on free motion for a stated rate of false alarms, in the manner of scikit-learn.
 
 Examples
 --------
@@ -12,7 +12,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize
@@ -46,8 +46,8 @@ from tendonfmu.detect.sensor_faults import SensorRule, learn_sensors
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import check_given_once
 from tendonfmu.files import are, counted
-from tendonfmu.model import Finger, moment_arms, read_finger
-from tendonfmu.options import Configured, Options, TuneOptions
+from tendonfmu.model import Finger, FingerSource, moment_arms, read_finger
+from tendonfmu.options import TuneOptions
 from tendonfmu.recordings import RecordingSource, admit, listed_sources, read_recordings
 
 # --- pushes that are found --------------------------------------------------------------------------------------------
@@ -175,7 +175,7 @@ class KeptOut:
         return sum(part.seconds for part in self.parts) / self.seconds
 
 
-class ContactTuning(Configured):
+class ContactTuning:
     """Tunes contact detection from recordings of free motion.
 
     Parameters
@@ -203,8 +203,8 @@ class ContactTuning(Configured):
         Sentences, each also raised as a TuneWarning, and the time of the computation (s).
     """
 
-    Options: ClassVar[type[Options]] = TuneOptions
-    options: TuneOptions
+    def __init__(self, finger: FingerSource, **options: Any) -> None:
+        self.finger, self.options = finger, TuneOptions(**options)
 
     def tune(self, recordings: RecordingSource | Sequence[RecordingSource], *, checked: bool = False) -> ContactTuning:
         """Tune on recordings of free motion.
@@ -323,8 +323,8 @@ class ContactTuning(Configured):
         return self._start.with_data({**self._data, "contact": contact})
 
     def _show(self, done: int, steps: int) -> None:
-        if self.progress is not None:
-            self.progress(done, steps)
+        if self.options.progress is not None:
+            self.options.progress(done, steps)
 
     # --- what is said -------------------------------------------------------------------------------------------------
 

@@ -22,8 +22,20 @@ if TYPE_CHECKING:
         with_previous_values,
     )
     from .fisher_information import Noise, Progress, information, noise_of, sensitivities
-    from .fit_report import FitPicture, FitSeries, LawBands, LawCurve, asymmetric, evaluate, numbers_of, unseen_square
-    from .fit_types import Comparison, FitReport, FittedNumber, ResidualRms
+    from .fit_report import (
+        Comparison,
+        FitPicture,
+        FitReport,
+        FitSeries,
+        FittedNumber,
+        LawBands,
+        LawCurve,
+        ResidualRms,
+        asymmetric,
+        evaluate,
+        numbers_of,
+        unseen_square,
+    )
     from .fitting import FitWarning, FrictionFit
     from .identifiability import EffectCoverage, Judgement, Verdict, counts_by_kind, coverage_of, durations, judge
     from .learning import (

@@ -18,7 +18,7 @@ import numpy as np
 from tendonfmu.arrays import Data, Numbers
 from tendonfmu.estimate.core_runs import CoreRuns, SlowDrift
 from tendonfmu.estimate.estimation import Estimator
-from tendonfmu.estimate.fit_types import MemoryEntry
+from tendonfmu.estimate.fit_report import MemoryEntry
 from tendonfmu.estimate.learning import Learned, Settings, Watch, unknown_names
 from tendonfmu.estimate.memory import (
     CORDS,

@@ -7,7 +7,7 @@ literal. It matches a number, or a part of the description and thus all numbers 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -21,12 +21,15 @@ from tendonfmu.estimate.memory import has_memory
 from tendonfmu.model import (
     LAW_NUMBERS,
     Finger,
+    Law,
     Number,
     effects,
     estimable_numbers,
     friction_numbers,
     law_path,
+    laws,
     own_copy,
+    set_number,
     sides,
 )
 
@@ -133,31 +136,17 @@ def with_sides(data: Mapping[str, Any], wanted: str) -> Mapping[str, Any]:
     if wanted == "given":
         return data
     change = _two_sides if wanted == "asymmetric" else _one_side
-    result: dict[str, Any] = own_copy(data)
-    for joint in result["joints"]:
-        for kind in ("friction", "load_friction"):
-            if joint.get(kind) is not None:
-                joint[kind] = change(joint[kind])
-    for tendon in result["tendons"]:
-        for kind in ("pulley_friction", "edge_friction"):
-            if tendon.get(kind) is not None:
-                tendon[kind] = [_of_entry(entry, change) for entry in tendon[kind]]
+    result = own_copy(data)
+    for path, _, law in list(laws(result)):
+        set_number(result, path, change(law))
     return result
 
 
-def _of_entry(entry: Any, change: Callable[[Any], Any]) -> Any:
-    if entry is None:
-        return None
-    if entry.get("laws") is not None:
-        return {**entry, "laws": [change(law) for law in entry["laws"]]}
-    return change(entry)
-
-
-def _two_sides(law: dict[str, Any]) -> dict[str, Any]:
+def _two_sides(law: Law) -> Law:
     return law if len(sides(law)) == 2 else {"positive": dict(law), "negative": dict(law)}
 
 
-def _one_side(law: dict[str, Any]) -> dict[str, Any]:
+def _one_side(law: Law) -> Law:
     both = sides(law)
     if len(both) == 1:
         return law

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
         finger_from_data,
         finger_from_text,
         finger_of,
+        laws,
         read_finger,
         sides,
         starting_finger,

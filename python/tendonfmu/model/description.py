@@ -211,7 +211,7 @@ class Finger:
         list of str
             One line each for joints, tendons, moment arms, stiffness, friction and numbers.
         """
-        return _summary_lines(count(self))
+        return _summary_lines(self, count(self))
 
     def _repr_html_(self) -> str:
         return finger_html(self.summary(), self.data)
@@ -224,9 +224,6 @@ FingerSource = Finger | Mapping[str, Any] | str | os.PathLike[str]
 class Counts:
     """What a finger has, in numbers."""
 
-    name: str
-    joint_names: list[str]
-    tendon_names: list[str]
     bidirectional_tendons: int
     moment_arms: tuple[float, float]  # least and largest magnitude (m; N/m), without moment arms of 0
     stiffness: tuple[float, float]
@@ -241,14 +238,6 @@ class Counts:
     tunable_parameters: int
     # counts of the numbers that a fit estimates, biases included (see `estimated_numbers()`)
     estimated_numbers: dict[str, int]
-
-    @property
-    def joints(self) -> int:
-        return len(self.joint_names)
-
-    @property
-    def tendons(self) -> int:
-        return len(self.tendon_names)
 
 
 def read_finger(source: FingerSource) -> Finger:
@@ -393,20 +382,19 @@ def _check_format(path: Path, text: bytes) -> None:
                 raise InputError(f'{path}: format = "{given}": {what}; expected a finger description, "{FORMAT}"')
 
 
-def laws(data: Mapping[str, Any]) -> Iterator[tuple[str, Law]]:
-    """Yield (kind, law) of every law of a valid description. Each working point is a separate law; kind is its key."""
-    for joint in data["joints"]:
+def laws(data: Mapping[str, Any]) -> Iterator[tuple[str, str, Law]]:
+    """Yield (path, kind, law) of every law of a valid description. Each working point is a separate law."""
+    for j, joint in enumerate(data["joints"], start=1):
         for kind in ("friction", "load_friction"):
             if joint.get(kind) is not None:
-                yield kind, joint[kind]
-    for tendon in data["tendons"]:
-        for law in tendon.get("pulley_friction") or []:
-            if law is not None:
-                yield "pulley_friction", law
-        for edge in tendon.get("edge_friction") or []:
-            if edge is not None:
-                for law in edge.get("laws") or [edge]:
-                    yield "edge_friction", law
+                yield f"joints[{j}].{kind}", kind, joint[kind]
+    for i, tendon in enumerate(data["tendons"], start=1):
+        for kind in ("pulley_friction", "edge_friction"):
+            for j, entry in enumerate(tendon.get(kind) or [], start=1):
+                path, points = f"tendons[{i}].{kind}[{j}]", [] if entry is None else entry.get("laws") or []
+                yield from ((f"{path}.laws[{k}]", kind, law) for k, law in enumerate(points, start=1))
+                if entry is not None and not points:
+                    yield path, kind, entry
 
 
 def estimated_numbers(data: Mapping[str, Any]) -> dict[str, int]:
@@ -437,17 +425,14 @@ def count(description: Finger) -> Counts:
     present = list(laws(data))
     edges = _entries(data, "edge_friction")
     return Counts(
-        name=description.name,
-        joint_names=description.joint_names,
-        tendon_names=description.tendon_names,
         bidirectional_tendons=sum(1 for tendon in data["tendons"] if tendon.get("bidirectional")),
         moment_arms=_range(abs(arm) for row in description.moment_arms for arm in row if arm),
         stiffness=_range(float(tendon["stiffness"]) for tendon in data["tendons"]),
         pulleys=len(_entries(data, "pulley_friction")),
         edges=len(edges),
         working_points=sum(len(edge.get("angles") or []) for edge in edges),
-        laws={kind: sum(1 for k, _ in present if k == kind) for kind in KINDS},
-        asymmetric_laws=sum(1 for _, law in present if len(sides(law)) == 2),
+        laws={kind: sum(1 for _, k, _ in present if k == kind) for kind in KINDS},
+        asymmetric_laws=sum(1 for _, _, law in present if len(sides(law)) == 2),
         covers=sum(1 for joint in data["joints"] if joint.get("cover") is not None),
         extensions=[row["effect"] for row in extension_rows(data)],
         parameters=len(description.numbers),
@@ -456,15 +441,15 @@ def count(description: Finger) -> Counts:
     )
 
 
-def _summary_lines(counts: Counts) -> list[str]:
+def _summary_lines(finger: Finger, counts: Counts) -> list[str]:
     laws = ", ".join(f"{number} {kind}" for kind, number in counts.laws.items() if number) or "none"
     estimated = ", ".join(f"{number} {kind}" for kind, number in counts.estimated_numbers.items() if number)
     loops = f", {counts.bidirectional_tendons} of them cable loops" if counts.bidirectional_tendons else ""
     asymmetric = f"; {counts.asymmetric_laws} of them asymmetric" if counts.asymmetric_laws else ""
     lines = [
-        f"{counts.name}: a valid finger description",
-        f"joints             {counts.joints}: {', '.join(counts.joint_names)}",
-        f"tendons            {counts.tendons}: {', '.join(counts.tendon_names)}{loops}",
+        f"{finger.name}: a valid finger description",
+        f"joints             {finger.joints}: {', '.join(finger.joint_names)}",
+        f"tendons            {finger.tendons}: {', '.join(finger.tendon_names)}{loops}",
         f"moment arms        {1e3 * counts.moment_arms[0]:.4g} to {1e3 * counts.moment_arms[1]:.4g} mm",
         f"stiffness          {counts.stiffness[0]:.4g} to {counts.stiffness[1]:.4g} N/m",
         f"pulleys, edges     {counts.pulleys}, {counts.edges} with {counted(counts.working_points, 'working point')}",

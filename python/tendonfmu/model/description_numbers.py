@@ -96,8 +96,8 @@ def get_number(data: Any, path: str) -> Any:
     return data
 
 
-def set_number(data: Any, path: str, value: float) -> None:
-    """Set a number of a parsed description in place."""
+def set_number(data: Any, path: str, value: Any) -> None:
+    """Set a number, or another part, of a parsed description in place."""
     *way, last = steps_of(path)
     for step in way:
         data = data[step]

@@ -14,6 +14,10 @@ from typing import TYPE_CHECKING, Any
 
 from tendonfmu.errors import InputError
 
+if TYPE_CHECKING:
+    from tendonfmu._plant import Settings as Settings
+    from tendonfmu._plant import Statistics as Statistics
+
 __all__ = ["HAS_PLANT", "MEASURED", "PLANT_MISSING", "TRUE", "Plant", "PlantError", "SolverError"]
 
 # find_spec, not try/except: a module that exists but does not load must raise its error

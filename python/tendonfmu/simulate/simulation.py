@@ -16,7 +16,7 @@ from tendonfmu.simulate.plant import MEASURED, TRUE, refused_by, require_plant
 from tendonfmu.simulate.rig import Rig, plant_of
 
 if TYPE_CHECKING:
-    from tendonfmu._plant import Statistics
+    from tendonfmu.simulate.plant import Statistics
 
 Table = dict[str, NDArray[np.float64]]
 

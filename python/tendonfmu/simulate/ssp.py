@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tendonfmu.errors import InputError
-from tendonfmu.files import check_output, counted, whole_file
+from tendonfmu.files import check_output, counted, write_bytes
 from tendonfmu.fmu import (
     NOT_IN_XML,
     OMS,
@@ -45,7 +45,7 @@ from tendonfmu.simulate.plant import refused_by
 from tendonfmu.simulate.rig import Rig, plant_of, read_rig
 
 if TYPE_CHECKING:
-    from tendonfmu._plant import Settings
+    from tendonfmu.simulate.plant import Settings
 
 # --- packing ----------------------------------------------------------------------------------------------------------
 # The binary is the same for every rig; the rig is a resource. The same input gives the same bytes. No compiler is
@@ -60,11 +60,7 @@ DURATION = 10.0  # s, of the default experiment if the rig has no recording
 
 def build_plant_fmu(rig_path: Path, output_path: Path, *, binaries: Path | None = None) -> Path:
     """Package the FMU of a rig's simulated finger."""
-    rig = read_rig(rig_path)
-    archive = pack(plant_members(rig, binaries=binaries))
-    with whole_file(output_path) as file:
-        file.write_bytes(archive)
-    return output_path
+    return write_bytes(output_path, pack(plant_members(read_rig(rig_path), binaries=binaries)))
 
 
 def plant_members(rig: Rig, *, binaries: Path | None = None) -> dict[str, bytes]:
@@ -167,10 +163,7 @@ def build_ssp(rig_path: Path, output_path: Path, finger: Path | None = None) -> 
     content = ssp_members(rig)
     if finger is not None:
         content[f"resources/{FRICTION_FMU}"] = pack(members(read_finger(finger)))
-    archive = pack(content)
-    with whole_file(output_path) as file:
-        file.write_bytes(archive)
-    return output_path
+    return write_bytes(output_path, pack(content))
 
 
 def ssp_members(rig: Rig) -> dict[str, bytes]:

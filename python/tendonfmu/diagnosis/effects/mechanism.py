@@ -46,7 +46,7 @@ def add_law(data: dict[str, Any], path: str) -> None:
     """Add a law where there was none."""
     place = law_path(path)
     if place is None or place.tendon is None:
-        set_number(data, path, dict(_ABSENT))  # type: ignore[arg-type]
+        set_number(data, path, dict(_ABSENT))
         return
     tendon = data["tendons"][place.tendon - 1]
     entries = list(tendon.get(place.kind) or [])
@@ -61,7 +61,7 @@ def add_points(angles: Sequence[float]) -> Callable[[dict[str, Any], str], None]
     def add(data: dict[str, Any], path: str) -> None:
         law = get_number(data, path)
         laws = [own_copy(law) for _ in angles]
-        set_number(data, path, {"angles": list(angles), "laws": laws})  # type: ignore[arg-type]
+        set_number(data, path, {"angles": list(angles), "laws": laws})
 
     return add
 
