@@ -61,7 +61,7 @@ def free_rms(folder: Path) -> dict[float, Numbers]:
     for take in hand.takes("free"):
         inputs = hand.recording(folder, take).arrays()
         every = np.ones(len(inputs["time"]), dtype=bool)
-        residual = np.nan_to_num(run_parts(finger.data, inputs, [slice(0, len(every))], every, 1).residual)
+        residual = np.nan_to_num(run_parts(finger, inputs, [slice(0, len(every))], every, 1).residual)
         squares.setdefault(take.pretension, []).append(np.mean(residual**2, axis=0))
     return {pretension: np.sqrt(np.mean(values, axis=0)) for pretension, values in squares.items()}
 

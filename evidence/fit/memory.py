@@ -24,7 +24,7 @@ from tendonfmu import run
 from tendonfmu.arrays import Numbers
 from tendonfmu.commands.fit import fit
 from tendonfmu.estimate import FitWarning
-from tendonfmu.model import Finger, finger_from_data, read_finger, without_learning
+from tendonfmu.model import Finger, read_finger
 from tendonfmu.recordings import Held, prepare, read_recording
 
 SEEDS = [2 * pair + 1 for pair, effect in enumerate(cases.ORDER) if effect == NONE][:2]
@@ -107,9 +107,7 @@ def chosen(nominal: Mapping[str, Any], recordings: Sequence[pd.DataFrame], kinem
 
 def residual(fitted: Finger, recording: pd.DataFrame, kinematics: int) -> Numbers:
     """[B, n] N·m, what the finger leaves of a recording, without what a bias would learn."""
-    bare = without_learning(fitted.data)
-    # nothing is forgotten: a place that sticks keeps what it held
-    silent = finger_from_data({**bare, "bias": {**bare["bias"], "forget_rate": 0.0}})
+    silent = fitted.steady  # nothing is forgotten: a place that sticks keeps what it held
     out = run(silent, recording, kinematics=kinematics).frame
     joints = len(silent.data["joints"])
     left = out[[f"compensated_torque[{j + 1}]" for j in range(joints)]].to_numpy()

@@ -20,47 +20,44 @@ numbers copied(const number_row& row) {
   return {row.data(), row.data() + row.size()};
 }
 
-const double* data(const std::optional<number_rows>& rows) {
-  return rows ? rows->data() : nullptr;
-}
-
-void expect_rows(const std::optional<number_rows>& rows, std::size_t samples, std::size_t columns, const char* name) {
-  if (rows && (rows->shape(0) != samples || rows->shape(1) != columns)) {
-    throw nb::value_error((std::string(name) + ": expected " + std::to_string(samples) + " rows of " +
-                           std::to_string(columns) + " columns")
-                              .c_str());
+// A recording of an estimator or a learner, in arrays that it keeps.
+struct bound_recording : recording_arrays {
+  template <typename Finger>
+  bound_recording(const Finger& finger, const nb::object& arrays, int source,
+                  const std::optional<number_rows>& external, const std::optional<flag_row>& use) {
+    time_ = array_in<number_row>(arrays, "time");
+    if (!time_) {
+      throw refusal("time: missing");
+    }
+    samples = time_->shape(0);
+    time = time_->data();
+    const std::size_t n = finger.joint_count(), m = finger.tendon_count();
+    inputs = {signal(arrays, "tendon_force", m), signal(arrays, "tendon_position", m),
+              signal(arrays, "joint_position", n), signal(arrays, "joint_velocity", n)};
+    external_torque = rows(external, "external_torque", n);
+    if (use && use->shape(0) != samples) {
+      throw refusal("use: expected one flag a sample");
+    }
+    this->use = use ? use->data() : nullptr;
+    kinematics_source = source;
   }
-}
 
-// A recording of an estimator or a learner; the arrays must outlive it.
-template <typename Finger>
-recording_arrays recording_of(const Finger& finger, const number_row& time, const number_rows& force,
-                              const std::optional<number_rows>& position, const std::optional<number_rows>& angle,
-                              const std::optional<number_rows>& velocity, int source,
-                              const std::optional<number_rows>& external, const std::optional<flag_row>& use) {
-  const std::size_t count = time.shape(0), n = finger.joint_count(), m = finger.tendon_count();
-  expect_rows(force, count, m, "tendon_force");
-  expect_rows(position, count, m, "tendon_position");
-  expect_rows(angle, count, n, "joint_position");
-  expect_rows(velocity, count, n, "joint_velocity");
-  expect_rows(external, count, n, "external_torque");
-  if (use && use->shape(0) != count) {
-    throw nb::value_error("use: expected one flag a sample");
+ private:
+  std::optional<number_row> time_;
+  std::vector<std::optional<number_rows>> kept_;
+
+  const double* signal(const nb::object& arrays, const char* name, std::size_t columns) {
+    kept_.push_back(array_in<number_rows>(arrays, name));
+    return rows(kept_.back(), name, columns);
   }
-  return {count,
-          time.data(),
-          {force.data(), data(position), data(angle), data(velocity)},
-          data(external),
-          use ? use->data() : nullptr,
-          source};
-}
-
-// path, role, parameters, start, lower, upper, scale
-template <typename Finger>
-nb::tuple unknown_of(const Finger& finger, std::size_t index) {
-  const unknown_item& u = finger.unknowns().at(index);
-  return nb::make_tuple(u.path, static_cast<int>(u.role), u.parameters, u.start, u.lower, u.upper, u.scale);
-}
+  const double* rows(const std::optional<number_rows>& array, const char* name, std::size_t columns) const {
+    if (array && (array->shape(0) != samples || array->shape(1) != columns)) {
+      throw refusal(std::string(name) + ": expected " + std::to_string(samples) + " rows of " +
+                    std::to_string(columns) + " columns");
+    }
+    return array ? array->data() : nullptr;
+  }
+};
 
 // A Python callable that may stop a long call, also by Ctrl-C or by what it raises.
 class python_watch {
@@ -95,36 +92,71 @@ class python_watch {
   std::unique_ptr<nb::python_error> raised_;
 };
 
-// watch(pass, stride, samples_done, samples, cost, best) -> bool
-nb::dict fit(const estimator& all, const number_row& start, double prior_std, double tolerance, std::size_t passes,
-             std::size_t stride, unsigned threads, const nb::object& watch) {
+// progress(pass, stride, samples_done, samples, cost, best) -> bool
+fit_result fit(const estimator& all, const std::optional<number_row>& start, double prior_std, std::size_t passes,
+               double tolerance, unsigned threads, std::size_t stride, const nb::object& progress) {
   const std::size_t u = all.unknowns().size();
-  python_watch watching(watch);
+  python_watch watching(progress);
   fit_result result;
   {
     const nb::gil_scoped_release without_gil;
-    result = all.fit(copied(start), {prior_std, tolerance, passes, stride, threads}, [&](const fit_progress& p) {
-      return watching.ask(
-          [&] { return nb::make_tuple(p.pass, p.stride, p.samples_done, p.samples, p.cost, as_array(*p.best, {u})); });
-    });
+    result =
+        all.fit(start ? copied(*start) : all.start(), {prior_std, tolerance, passes, stride, threads},
+                [&](const fit_progress& p) {
+                  return watching.ask([&] {
+                    return nb::make_tuple(p.pass, p.stride, p.samples_done, p.samples, p.cost, as_array(*p.best, {u}));
+                  });
+                });
   }
   watching.rethrow();
   for (numbers* matrix : {&result.information, &result.covariance}) {
     matrix->resize(u * u);
   }
   result.gradient.resize(u);
-  nb::dict fitted;
-  fitted["z"] = as_array(std::move(result.z), {u});
-  fitted["gradient"] = as_array(std::move(result.gradient), {u});
-  fitted["information"] = as_array(std::move(result.information), {u, u});
-  fitted["covariance"] = as_array(std::move(result.covariance), {u, u});
-  fitted["cost"] = result.cost;
-  fitted["prior_cost"] = result.prior_cost;
-  fitted["passes"] = result.passes;
-  fitted["steps"] = result.steps;
-  fitted["converged"] = result.converged;
-  fitted["stopped"] = result.stopped;
-  return fitted;
+  return result;
+}
+
+// A matrix [u, u] of a result.
+template <numbers fit_result::*matrix>
+nb::object square(const fit_result& found) {
+  return as_array(found.*matrix, {found.gradient.size(), found.gradient.size()});
+}
+
+void bind_results(nb::module_& m) {
+  static constexpr const char* roles[] = {"coulomb", "drop", "rate", "viscous", "value"};
+  nb::class_<unknown_item>(m, "Unknown")
+      .def_ro("path", &unknown_item::path)
+      .def_prop_ro("role", [](const unknown_item& u) { return roles[static_cast<int>(u.role)]; })
+      .def_prop_ro("parameters", [](const unknown_item& u) { return nb::tuple(nb::cast(u.parameters)); })
+      .def_ro("start", &unknown_item::start)
+      .def_ro("lower", &unknown_item::lower)
+      .def_ro("upper", &unknown_item::upper)
+      .def_ro("scale", &unknown_item::scale)
+      .def_prop_ro("name", [](const unknown_item& u) {
+        const std::string place = u.path.substr(0, u.path.rfind('.') + 1);
+        return u.role == unknown_role::value ? u.path : place + roles[static_cast<int>(u.role)];
+      });
+  nb::class_<fit_result>(m, "BatchResult")
+      .def_prop_ro("z", [](const fit_result& found) { return as_array(found.z); })
+      .def_prop_ro("gradient", [](const fit_result& found) { return as_array(found.gradient); })
+      .def_prop_ro("information", &square<&fit_result::information>)
+      .def_prop_ro("covariance", &square<&fit_result::covariance>)
+      .def_ro("cost", &fit_result::cost)
+      .def_ro("prior_cost", &fit_result::prior_cost)
+      .def_ro("passes", &fit_result::passes)
+      .def_ro("steps", &fit_result::steps)
+      .def_ro("converged", &fit_result::converged)
+      .def_ro("stopped", &fit_result::stopped);
+}
+
+// Of the unknowns of an estimator or a learner: their start, or another number of each.
+template <double unknown_item::*number, typename Finger>
+nb::object of_unknowns(const Finger& finger) {
+  numbers values;
+  for (const unknown_item& unknown : finger.unknowns()) {
+    values.push_back(unknown.*number);
+  }
+  return as_array(std::move(values));
 }
 
 void bind_estimator(nb::module_& m) {
@@ -137,30 +169,25 @@ void bind_estimator(nb::module_& m) {
           },
           nb::arg("image"), nb::arg("group") = nb::none(), nb::arg("scale") = nb::none())
       .def_prop_ro("joints", &estimator::joint_count)
-      .def_prop_ro("tendons", &estimator::tendon_count)
-      .def_prop_ro("parameter_count", &estimator::parameter_count)
-      .def_prop_ro("unknown_count", [](const estimator& all) { return all.unknowns().size(); })
-      .def("unknown", &unknown_of<estimator>)
+      .def_prop_ro("unknowns", &estimator::unknowns)
+      .def_prop_ro("start", &of_unknowns<&unknown_item::start, estimator>)
+      .def_prop_ro("scale", &of_unknowns<&unknown_item::scale, estimator>)
       .def("values", [](const estimator& all, const number_row& z) { return as_array(all.values(copied(z))); })
       .def("unknown_values",
            [](const estimator& all, const number_row& values) { return as_array(all.unknown_values(copied(values))); })
       .def(
           "add_recording",
-          [](estimator& all, const number_row& time, const number_rows& force,
-             const std::optional<number_rows>& position, const std::optional<number_rows>& angle,
-             const std::optional<number_rows>& velocity, int source, const std::optional<number_rows>& external,
+          [](estimator& all, const nb::object& arrays, int source, const std::optional<number_rows>& external,
              const std::optional<flag_row>& use, const std::optional<flag_rows>& silent) {
-            recording_arrays added = recording_of(all, time, force, position, angle, velocity, source, external, use);
+            bound_recording added(all, arrays, source, external, use);
             if (silent && (silent->shape(0) != added.samples || silent->shape(1) != all.joint_count())) {
-              throw nb::value_error("silent: expected one flag a sample and joint");
+              throw refusal("silent: expected one flag a sample and joint");
             }
             added.silent = silent ? silent->data() : nullptr;
             return all.add_recording(added);
           },
-          nb::arg("time"), nb::arg("tendon_force"), nb::arg("tendon_position") = nb::none(),
-          nb::arg("joint_position") = nb::none(), nb::arg("joint_velocity") = nb::none(),
-          nb::arg("kinematics_source") = 1, nb::arg("external_torque") = nb::none(), nb::arg("use") = nb::none(),
-          nb::arg("silent") = nb::none())
+          nb::arg("arrays"), nb::arg("kinematics_source") = 1, nb::arg("external_torque") = nb::none(),
+          nb::arg("use") = nb::none(), nb::arg("silent") = nb::none())
       .def(
           "set_weights",
           [](estimator& all, std::size_t recording, const number_row& weight) {
@@ -186,16 +213,19 @@ void bind_estimator(nb::module_& m) {
                                   as_array(std::move(at.information), {u, u}));
           },
           nb::arg("z"), nb::arg("stride") = 1, nb::arg("threads") = 0)
-      .def("jacobian",
-           [](const estimator& all, std::size_t recording, const number_row& z, std::size_t first, std::size_t count,
-              std::size_t length) {
-             const std::size_t u = all.unknowns().size(), n = all.joint_count();
-             estimator::block_means means = all.jacobian(recording, copied(z), first, count, length);
-             return nb::make_tuple(as_array(std::move(means.torque), {count, n}),
-                                   as_array(std::move(means.jump), {count, n}),
-                                   as_array(std::move(means.torque_derivative), {count, n, u}),
-                                   as_array(std::move(means.jump_derivative), {count, n, u}));
-           })
+      .def(
+          "jacobian",
+          [](const estimator& all, std::size_t recording, const number_row& z, std::size_t start, std::size_t stop,
+             std::size_t length) {
+            const std::size_t u = all.unknowns().size(), n = all.joint_count();
+            const std::size_t count = stop > start ? (stop - start) / length : 0;
+            estimator::block_means means = all.jacobian(recording, copied(z), start, count, length);
+            return nb::make_tuple(as_array(std::move(means.torque), {count, n}),
+                                  as_array(std::move(means.jump), {count, n}),
+                                  as_array(std::move(means.torque_derivative), {count, n, u}),
+                                  as_array(std::move(means.jump_derivative), {count, n, u}));
+          },
+          nb::arg("recording"), nb::arg("z"), nb::arg("start"), nb::arg("stop"), nb::arg("length") = 1)
       .def("innovations",
            [](const estimator& all, std::size_t recording, const number_row& z) {
              estimator::residuals r = all.innovations(recording, copied(z));
@@ -204,38 +234,36 @@ void bind_estimator(nb::module_& m) {
                                    as_array(std::move(r.variance), {samples, n}),
                                    as_array(std::move(r.bias), {samples, n}));
            })
-      .def("fit", &fit, nb::arg("start"), nb::arg("prior_std"), nb::arg("tolerance"), nb::arg("passes"),
-           nb::arg("stride"), nb::arg("threads"), nb::arg("watch") = nb::none());
+      .def("fit", &fit, nb::arg("start") = nb::none(), nb::arg("prior_std") = 1.0, nb::arg("max_passes") = 60,
+           nb::arg("tolerance") = 0.3, nb::arg("threads") = 0, nb::arg("stride") = 0, nb::arg("progress") = nb::none());
 }
 
-// innovation and variance [N, n], samples taken; watch(samples_done, samples) -> bool
-nb::tuple run(learner& self, const number_row& time, const number_rows& force,
-              const std::optional<number_rows>& position, const std::optional<number_rows>& angle,
-              const std::optional<number_rows>& velocity, int source, const std::optional<number_rows>& external,
-              const std::optional<flag_row>& use, const nb::object& watch) {
-  const recording_arrays recording = recording_of(self, time, force, position, angle, velocity, source, external, use);
+// progress(samples_done, samples) -> bool
+nb::dict run(learner& self, const nb::object& arrays, int source, const std::optional<number_rows>& external,
+             const std::optional<flag_row>& use, const nb::object& progress) {
+  const bound_recording recording(self, arrays, source, external, use);
   const std::size_t n = self.joint_count();
   numbers innovation(recording.samples * n), variance(innovation);
-  std::size_t done = 0;
-  python_watch watching(watch);
+  python_watch watching(progress);
   {
     const nb::gil_scoped_release without_gil;
-    done = self.run(recording, innovation.data(), variance.data(), [&](std::size_t row, std::size_t samples) {
+    self.run(recording, innovation.data(), variance.data(), [&](std::size_t row, std::size_t samples) {
       return watching.ask([&] { return nb::make_tuple(row, samples); });
     });
   }
   watching.rethrow();
-  return nb::make_tuple(as_array(std::move(innovation), {recording.samples, n}),
-                        as_array(std::move(variance), {recording.samples, n}), done);
+  nb::dict outputs;
+  outputs["innovation"] = as_array(std::move(innovation), {recording.samples, n});
+  outputs["innovation_variance"] = as_array(std::move(variance), {recording.samples, n});
+  return outputs;
 }
 
-// What a call writes into two arrays, both [count], or [count] and [count, count].
-template <typename Get>
-nb::tuple two_arrays(std::size_t count, bool square, const Get& get) {
-  numbers first(count), second(square ? count * count : count);
-  get(first.data(), second.data());
-  return nb::make_tuple(as_array(std::move(first)),
-                        square ? as_array(std::move(second), {count, count}) : as_array(std::move(second)));
+// What a getter of two arrays writes into the first, or the second.
+template <void (learner::*get)(double*, double*) const, bool second = false>
+nb::object got(const learner& self, std::size_t count) {
+  numbers values(count);
+  (self.*get)(second ? nullptr : values.data(), second ? values.data() : nullptr);
+  return as_array(std::move(values));
 }
 
 void bind_learner(nb::module_& m) {
@@ -248,35 +276,30 @@ void bind_learner(nb::module_& m) {
            }),
            nb::arg("image"), nb::arg("group") = nb::none(), nb::arg("scale") = nb::none(), nb::arg("prior_std") = 1.0,
            nb::arg("block") = 8, nb::arg("parameter_drift") = 0.0)
-      .def_prop_ro("joints", &learner::joint_count)
-      .def_prop_ro("tendons", &learner::tendon_count)
-      .def_prop_ro("unknown_count", [](const learner& self) { return self.unknowns().size(); })
+      .def_prop_ro("unknowns", &learner::unknowns)
       .def_prop_ro("slack_samples", &learner::slack_samples)
-      .def("unknown", &unknown_of<learner>)
-      .def("run", &run, nb::arg("time"), nb::arg("tendon_force"), nb::arg("tendon_position") = nb::none(),
-           nb::arg("joint_position") = nb::none(), nb::arg("joint_velocity") = nb::none(),
-           nb::arg("kinematics_source") = 1, nb::arg("external_torque") = nb::none(), nb::arg("use") = nb::none(),
-           nb::arg("watch") = nb::none())
+      .def("run", &run, nb::arg("arrays"), nb::arg("kinematics_source") = 1, nb::arg("external_torque") = nb::none(),
+           nb::arg("use") = nb::none(), nb::arg("progress") = nb::none())
       .def("begin_pass", &learner::begin_pass)
-      .def("values",
-           [](const learner& self) {
-             return two_arrays(self.parameter_count(), false,
-                               [&](double* values, double* errors) { self.get_values(values, errors); });
-           })
-      .def("unknown_values",
-           [](const learner& self) {
-             return two_arrays(self.unknowns().size(), true,
-                               [&](double* z, double* covariance) { self.get_unknowns(z, covariance); });
-           })
-      .def("bias", [](const learner& self) {
-        return two_arrays(self.joint_count(), false,
-                          [&](double* bias, double* errors) { self.get_bias(bias, errors); });
-      });
+      .def("values", [](const learner& self) { return got<&learner::get_values>(self, self.parameter_count()); })
+      .def("standard_errors",
+           [](const learner& self) { return got<&learner::get_values, true>(self, self.parameter_count()); })
+      .def_prop_ro("z", [](const learner& self) { return got<&learner::get_unknowns>(self, self.unknowns().size()); })
+      .def_prop_ro("covariance",
+                   [](const learner& self) {
+                     const std::size_t u = self.unknowns().size();
+                     numbers covariance(u * u);
+                     self.get_unknowns(nullptr, covariance.data());
+                     return as_array(std::move(covariance), {u, u});
+                   })
+      .def_prop_ro("bias", [](const learner& self) { return got<&learner::get_bias>(self, self.joint_count()); });
 }
 
 }  // namespace
 
 NB_MODULE(_estimation, m) {
+  nb::exception<std::invalid_argument>(m, "EstimationError", PyExc_ValueError);
+  bind_results(m);
   bind_estimator(m);
   bind_learner(m);
 }

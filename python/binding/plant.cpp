@@ -9,7 +9,13 @@
 
 namespace {
 
+using namespace nb::literals;
 using plant_signals = tendonfmu_plant_signals;
+
+// What the integrator could not do; a refusal is what was asked of it.
+struct solver_failure : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
 
 enum class signal_size { one, three, six, joints, tendons };
 
@@ -62,9 +68,9 @@ const Entry* find(const Entry (&entries)[count], const std::string& name) {
 
 class bound_plant : bound_handle<tendonfmu_plant, tendonfmu_plant_destroy, tendonfmu_plant_last_error> {
  public:
-  explicit bound_plant(const nb::bytes& json)
+  explicit bound_plant(const std::string& json)
       : bound_handle([&](char* message, std::size_t size) {
-          return tendonfmu_plant_create(static_cast<const char*>(json.data()), json.size(), message, size);
+          return tendonfmu_plant_create(json.data(), json.size(), message, size);
         }) {}
 
   std::size_t joints() const { return tendonfmu_plant_joint_count(get()); }
@@ -73,21 +79,32 @@ class bound_plant : bound_handle<tendonfmu_plant, tendonfmu_plant_destroy, tendo
   double time() const { return tendonfmu_plant_get_time(get()); }
   bool initialised() const { return tendonfmu_plant_is_initialised(get()) != 0; }
 
-  nb::tuple settings() const {
-    tendonfmu_plant_settings s;
-    check(tendonfmu_plant_get_settings(get(), &s));
-    return nb::make_tuple(s.relative_tolerance, s.scheduled_motion != 0, s.scheduled_pushes != 0, s.sensors != 0,
-                          s.seed, nb::make_tuple(s.push_point[0], s.push_point[1], s.push_point[2]), s.push_link);
+  nb::object settings() const {
+    const tendonfmu_plant_settings s = plain_settings();
+    return namespace_of("relative_tolerance"_a = s.relative_tolerance, "scheduled_motion"_a = s.scheduled_motion != 0,
+                        "scheduled_pushes"_a = s.scheduled_pushes != 0, "sensors"_a = s.sensors != 0, "seed"_a = s.seed,
+                        "push_point"_a = nb::make_tuple(s.push_point[0], s.push_point[1], s.push_point[2]),
+                        "push_link"_a = s.push_link);
   }
-  void set_settings(double tolerance, bool motion, bool pushes, bool sensors, std::uint64_t seed,
-                    const std::array<double, 3>& point, int link) {
-    const tendonfmu_plant_settings s = {tolerance, motion, pushes, sensors, seed, {point[0], point[1], point[2]}, link};
+  void configure(std::optional<double> tolerance, std::optional<bool> motion, std::optional<bool> pushes,
+                 std::optional<bool> sensors, std::optional<std::uint64_t> seed,
+                 std::optional<std::array<double, 3>> point, std::optional<int> link) {
+    tendonfmu_plant_settings s = plain_settings();
+    s.relative_tolerance = tolerance.value_or(s.relative_tolerance);
+    s.scheduled_motion = motion.value_or(s.scheduled_motion != 0);
+    s.scheduled_pushes = pushes.value_or(s.scheduled_pushes != 0);
+    s.sensors = sensors.value_or(s.sensors != 0);
+    s.seed = seed.value_or(s.seed);
+    s.push_link = link.value_or(s.push_link);
+    if (point) {
+      std::copy(point->begin(), point->end(), s.push_point);
+    }
     check(tendonfmu_plant_set_settings(get(), &s));
   }
   void set_inputs(const std::optional<std::vector<double>>& command, double pretension,
                   const std::array<double, 3>& push) {
     if (command && command->size() != tendons()) {
-      throw nb::value_error("set_inputs: expected one command per tendon");
+      throw refusal("set_inputs: expected one command per tendon");
     }
     const tendonfmu_plant_inputs inputs = {
         command ? command->data() : nullptr, pretension, {push[0], push[1], push[2]}};
@@ -101,28 +118,28 @@ class bound_plant : bound_handle<tendonfmu_plant, tendonfmu_plant_destroy, tendo
     check(released([this, time] { return tendonfmu_plant_advance(get(), time); }));
   }
   void reset() { check(tendonfmu_plant_reset(get())); }
-  std::vector<double> hold_command() const {
-    std::vector<double> command(tendons());
-    check(tendonfmu_plant_hold_command(get(), command.data()));
+  nb::object hold_command() const {
+    auto [command, values] = new_array<double>({tendons()});
+    check(tendonfmu_plant_hold_command(get(), values));
     return command;
   }
 
-  // The signals named, each an array of [samples, size].
+  // The signals named, each an array of [samples, size], or [samples].
   nb::dict run(const number_row& time, const std::vector<std::string>& names) {
     const std::size_t samples = time.shape(0);
     plant_signals signals = {};
     nb::dict arrays;
     for (const std::string& name : names) {
       if (const number_signal* number = find(numbers, name)) {
-        auto [array, values] = new_array<double>({samples, size_of(number->size)});
+        auto [array, values] = new_array<double>(shape_of(samples, number->size));
         signals.*(number->place) = values;
         arrays[name.c_str()] = array;
       } else if (const flag_signal* flag = find(flags, name)) {
-        auto [array, values] = new_array<unsigned char>({samples, size_of(flag->size)});
+        auto [array, values] = new_array<unsigned char, bool>(shape_of(samples, flag->size));
         signals.*(flag->place) = values;
         arrays[name.c_str()] = array;
       } else {
-        throw nb::value_error(("no signal " + name).c_str());
+        throw refusal("no signal " + name);
       }
     }
     check(released([&] { return tendonfmu_plant_run(get(), samples, time.data(), &signals, nullptr); }));
@@ -137,24 +154,24 @@ class bound_plant : bound_handle<tendonfmu_plant, tendonfmu_plant_destroy, tendo
   void restore_state(const nb::bytes& bytes) {
     check(tendonfmu_plant_restore_state(get(), bytes.data(), bytes.size()));
   }
-  nb::tuple statistics() const {
+  nb::object statistics() const {
     tendonfmu_plant_statistics s;
     check(tendonfmu_plant_get_statistics(get(), &s));
-    return nb::make_tuple(s.steps, s.right_hand_sides, s.jacobians, s.roots, s.restarts);
+    return namespace_of("steps"_a = s.steps, "right_hand_sides"_a = s.right_hand_sides, "jacobians"_a = s.jacobians,
+                        "roots"_a = s.roots, "restarts"_a = s.restarts);
   }
 
   nb::object continuous_state() const {
-    auto [array, values] = new_array<double>({1, order()});
+    auto [array, values] = new_array<double>({order()});
     check(tendonfmu_plant_get_continuous_state(get(), values));
     return array;
   }
-  // [1, order]
   nb::object derivative(double time, const number_row& state) const {
     const std::size_t size = order();
     if (state.shape(0) != size) {
-      throw nb::value_error(("derivative: expected a state of " + std::to_string(size) + " numbers").c_str());
+      throw refusal("derivative: expected a state of " + std::to_string(size) + " numbers");
     }
-    auto [slope, values] = new_array<double>({1, size});
+    auto [slope, values] = new_array<double>({size});
     check(tendonfmu_plant_derivative(get(), time, state.data(), values));
     return slope;
   }
@@ -167,48 +184,69 @@ class bound_plant : bound_handle<tendonfmu_plant, tendonfmu_plant_destroy, tendo
     return call();
   }
 
-  // ValueError for what was asked, RuntimeError for what the integrator could not do.
+  template <typename... Fields>
+  static nb::object namespace_of(Fields&&... fields) {
+    return nb::module_::import_("types").attr("SimpleNamespace")(std::forward<Fields>(fields)...);
+  }
+
+  tendonfmu_plant_settings plain_settings() const {
+    tendonfmu_plant_settings s;
+    check(tendonfmu_plant_get_settings(get(), &s));
+    return s;
+  }
+
   void check(tendonfmu_plant_status status) const {
     if (status == TENDONFMU_PLANT_SOLVER) {
-      throw std::runtime_error(reason());
+      throw solver_failure(reason());
     }
     expect(status);
   }
 
-  std::size_t size_of(signal_size size) const {
+  std::vector<std::size_t> shape_of(std::size_t samples, signal_size size) const {
     switch (size) {
-      case signal_size::one: return 1;
-      case signal_size::three: return 3;
-      case signal_size::six: return 6;
-      case signal_size::joints: return joints();
-      case signal_size::tendons: return tendons();
+      case signal_size::three: return {samples, 3};
+      case signal_size::six: return {samples, 6};
+      case signal_size::joints: return {samples, joints()};
+      case signal_size::tendons: return {samples, tendons()};
+      default: return {samples};
     }
-    return 0;
   }
 };
 
 }  // namespace
 
 NB_MODULE(_plant, m) {
+  const nb::exception<refusal> refused(m, "PlantError", PyExc_ValueError);
+  nb::exception<solver_failure>(m, "SolverError", refused.ptr());
+  std::vector<std::string> all;
+  for (const number_signal& number : numbers) {
+    all.emplace_back(number.name);
+  }
+  for (const flag_signal& flag : flags) {
+    all.emplace_back(flag.name);
+  }
+  const nb::object none = nb::none();
   nb::class_<bound_plant>(m, "Plant")
-      .def(nb::init<const nb::bytes&>())
+      .def(nb::init<const std::string&>())
       .def_prop_ro("joints", &bound_plant::joints)
       .def_prop_ro("tendons", &bound_plant::tendons)
       .def_prop_ro("order", &bound_plant::order)
       .def_prop_ro("time", &bound_plant::time)
       .def_prop_ro("initialised", &bound_plant::initialised)
-      .def("settings", &bound_plant::settings)
-      .def("set_settings", &bound_plant::set_settings)
-      .def("set_inputs", &bound_plant::set_inputs, nb::arg("command").none(), nb::arg("pretension"),
-           nb::arg("push_force"))
+      .def_prop_ro("settings", &bound_plant::settings)
+      .def("configure", &bound_plant::configure, "relative_tolerance"_a = none, "scheduled_motion"_a = none,
+           "scheduled_pushes"_a = none, "sensors"_a = none, "seed"_a = none, "push_point"_a = none,
+           "push_link"_a = none)
+      .def("set_inputs", &bound_plant::set_inputs, "tendon_position_command"_a = none, "pretension"_a = 0.0,
+           "push_force"_a = std::array<double, 3>{})
       .def("initialise", &bound_plant::initialise)
       .def("advance", &bound_plant::advance)
       .def("reset", &bound_plant::reset)
       .def("hold_command", &bound_plant::hold_command)
-      .def("run", &bound_plant::run)
+      .def("run", &bound_plant::run, "time"_a, "signals"_a = all)
       .def("save_state", &bound_plant::save_state)
       .def("restore_state", &bound_plant::restore_state)
-      .def("statistics", &bound_plant::statistics)
+      .def_prop_ro("statistics", &bound_plant::statistics)
       .def("continuous_state", &bound_plant::continuous_state)
       .def("derivative", &bound_plant::derivative);
 }

@@ -12,16 +12,14 @@ from __future__ import annotations
 import functools
 import inspect
 import math
-import operator
 import os
-import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from enum import IntEnum
 from numbers import Integral, Real
 from pathlib import Path
 from reprlib import Repr
-from typing import TYPE_CHECKING, Any, ClassVar, Concatenate, ParamSpec, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeAlias, TypeVar
 
 from tendonfmu.errors import InputError
 
@@ -38,7 +36,6 @@ Second = TypeVar("Second")
 Result = TypeVar("Result")
 Keywords = ParamSpec("Keywords")
 Taken = TypeVar("Taken", bound="Options")
-Made = TypeVar("Made", bound="Configured")
 
 
 class KinematicsSource(IntEnum):
@@ -49,111 +46,95 @@ class KinematicsSource(IntEnum):
     JOINT_POSITIONS_AND_VELOCITIES = 3
 
 
-# --- which values an option takes -------------------------------------------------------------------------------------
-
-
-@dataclass(eq=False, repr=False)
-class Values:
-    """Which values an option takes."""
-
-    type: Any  # on the command line
-    words: str
-    read: Callable[[Any], Any]  # returns a plain value, or raises ValueError
-    limits: dict[str, float] = field(default_factory=dict)  # least and most, as typer takes them
-
-
-def number(least: float, most: float = math.inf, whole: bool = False, optional: bool = False) -> Values:
-    """Take a number from `least` to `most`; both are allowed."""
-
-    def read(value: Any) -> float | int | None:
-        if value is None and optional:
-            return None
-        if isinstance(value, bool) or not isinstance(value, Integral if whole else Real):
-            raise ValueError
-        if not least <= value <= most:  # type: ignore[operator]
-            raise ValueError
-        plain: float | int = (int if whole else float)(value)  # type: ignore[call-overload]
-        return plain
-
-    kind: Any = int if whole else float
-    reach = f"{least:.16g} to {most:.16g}" if most < math.inf else f"{least:.16g} or more"
-    words = f"a {'whole ' * whole}number, {reach}{', or None' * optional}"
-    limits = {"min": least} | ({"max": most} if most < math.inf else {})
-    return Values(kind | None if optional else kind, words, read, limits)
-
-
-def choice(*texts: str) -> Values:
-    """Take one of several texts."""
-
-    def read(value: Any) -> str:
-        if not (isinstance(value, str) and value in texts):
-            raise ValueError
-        return value
-
-    return Values(str, " or ".join(texts), read)
-
-
-def kind(words: str, *types: Any, optional: bool = False) -> Values:
-    """Take a value of one of `types`; the first is that on the command line."""
-
-    def read(value: Any) -> Any:
-        if bool in types and type(value).__name__ in ("bool", "bool_"):  # of numpy, which takes 0.1 s to import
-            return bool(value)
-        if not (isinstance(value, types) or (value is None and optional)):
-            raise ValueError
-        return value
-
-    return Values(types[0] | None if optional else types[0], words + " or None" * optional, read)
-
-
-def several(words: str, item: Values) -> Values:
-    """Take one value or several; on the command line an option that may be repeated."""
-
-    def read(value: Any) -> Any:
-        alone = isinstance(value, str | os.PathLike) or not isinstance(value, Iterable)
-        items = [item.read(each) for each in ([value] if alone else value)]
-        # scikit-learn's clone wants back the very list that it passed
-        unchanged = isinstance(value, list) and all(map(operator.is_, items, value))
-        return value if unchanged else items
-
-    return Values(list[item.type] | None, words, read, item.limits)  # type: ignore[name-defined]
+# --- an option, and the options of a command --------------------------------------------------------------------------
 
 
 File = str | os.PathLike[str]
-_COLUMN = kind("the name of a column", str, optional=True)
-_PATH = kind("a path", Path, str, os.PathLike, optional=True)
-_TEXTS = several("a text or a list of texts", kind("a text", str))
-_PATHS = several("a path or a list of paths", kind("a path", Path, str, os.PathLike))
-# who uses recordings checks them
-_RECORDING = Values(Path | None, "a recording, DataFrame or file or None", lambda given: given)
-_RECORDINGS = Values(list[Path] | None, "a recording, DataFrame or file, or a list of them", lambda given: given)
-_FUNCTION = kind("a function", Callable, optional=True)
-_YES, _YES_OR_NONE = kind("True or False", bool), kind("True, False", bool, optional=True)
-
-
-# --- an option, and the options of a command --------------------------------------------------------------------------
+Column = str
+# type of an option, as annotated -> the word for a value, its type on the command line, and its types in Python
+_TYPES: Mapping[str, tuple[str, Any, Any]] = {
+    "int": ("whole number", int, Integral),
+    "float": ("number", float, Real),
+    "bool": ("True or False", bool, bool),
+    "str": ("text", str, str),
+    "Column": ("the name of a column", str, str),
+    "File": ("path", Path, (str, os.PathLike)),
+    "Callable": ("function", None, Callable),
+    "RecordingSource": ("recording, DataFrame or file", Path, object),  # who uses recordings checks them
+    "RecordingSources": ("recording, DataFrame or file", Path, object),
+}
 
 
 @dataclass(eq=False, repr=False)
 class Option:
     """What an option takes, and how the command line shows it."""
 
-    values: Values
-    help: str | None = None
+    name: str
+    annotation: str
+    default: Any
+    help: str = ""
     metavar: str | None = None
+    least: float | None = None  # of a number; both ends are allowed
+    most: float = math.inf
+    texts: Sequence[str] = ()  # which it takes, if it takes no others
     names: tuple[str, ...] = ()  # on the command line, where that of the field is not enough
     shown: bool = True  # on the command line
 
-    def sentence(self, default: Any) -> str:
+    def __post_init__(self) -> None:
+        plain = self.annotation.removesuffix(" | None")
+        self.optional, self.several = plain != self.annotation, plain.startswith(("Sequence[", "RecordingSources"))
+        self.type = plain.removeprefix("Sequence[").partition("[")[0].rstrip("]")
+        self.word, self.kind, self._types = _TYPES[self.type]
+
+    @property
+    def words(self) -> str:
+        """Which values it takes."""
+        if self.type == "bool":
+            return "True, False or None" if self.optional else "True or False"
+        if self.type == "RecordingSources":
+            return f"a {self.word}, or a list of them"
+        words = " or ".join(self.texts) or f"{'' if self.word.startswith('the ') else 'a '}{self.word}"
+        words += f" or a list of {self.word}s" if self.several else ""
+        if self.least is not None:
+            words += f", {self.least:.16g} " + (f"to {self.most:.16g}" if self.most < math.inf else "or more")
+        return words + ("" if not self.optional else " or None" if self.least is None else ", or None")
+
+    def read(self, value: Any) -> Any:
+        """Return a plain value. Raises ValueError."""
+        if self._types is object or (value is None and self.optional):
+            return value
+        if not self.several:
+            return self._one(value)
+        alone = isinstance(value, str | os.PathLike) or not isinstance(value, Iterable)
+        return [self._one(each) for each in ([value] if alone else value)]
+
+    def _one(self, value: Any) -> Any:
+        if self.type == "bool" and type(value).__name__ in ("bool", "bool_"):  # of numpy, which takes 0.1 s to import
+            return bool(value)
+        is_number = self.least is not None
+        if not isinstance(value, self._types) or (is_number and isinstance(value, bool)):
+            raise ValueError
+        if (is_number and not self.least <= value <= self.most) or (self.texts and value not in self.texts):
+            raise ValueError
+        return self.kind(value) if is_number else value
+
+    def sentence(self) -> str:
         """Describe the option for readers of Python: what it is, its values and its default."""
-        words = re.sub(r"; may be repeated| \[default: .*\]", "", self.help or "")
-        usual = re.findall(r"\[default: (.*)\]", self.help or "") or [repr(default)]
-        return f"{words[:1].upper()}{words[1:]} ({self.values.words}; default {usual[0]})."
+        words, _, usual = self.help.partition(" [default: ")
+        return f"{words[:1].upper()}{words[1:]} ({self.words}; default {usual[:-1] or repr(self.default)})."
 
 
-def option(default: Any, values: Values, help: str = "", **shown: Any) -> Any:
-    """Make the field of an option, which is given by its name."""
-    return field(default=default, metadata={"option": Option(values, help or None, **shown)})
+def option(
+    default: Any,
+    help: str = "",
+    metavar: str | None = None,
+    least: float | None = None,
+    most: float = math.inf,
+    **others: Any,
+) -> Any:
+    """Make the field of an `Option`. Its type is the annotation; a number has a least value, and a most."""
+    given = {"help": help, "metavar": metavar, "least": least, "most": most, **others}
+    return field(default=default, metadata=given)
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -163,10 +144,10 @@ class Options:
     def __post_init__(self) -> None:
         for name, each in self.each().items():
             try:
-                object.__setattr__(self, name, each.values.read(getattr(self, name)))
+                object.__setattr__(self, name, each.read(getattr(self, name)))
             except ValueError:
                 given = _SHORT.repr(getattr(self, name))
-                raise InputError(f"{name}: {given}; expected {each.values.words}") from None
+                raise InputError(f"{name}: {given}; expected {each.words}") from None
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({', '.join(f'{name}={value!r}' for name, value in vars(self).items())})"
@@ -174,12 +155,7 @@ class Options:
     @classmethod
     def each(cls) -> dict[str, Option]:
         """Return the options by name."""
-        return {each.name: each.metadata["option"] for each in fields(cls)}
-
-    @classmethod
-    def defaults(cls) -> dict[str, Any]:
-        """Return the defaults by name."""
-        return {each.name: each.default for each in fields(cls)}
+        return {each.name: Option(each.name, str(each.type), each.default, **each.metadata) for each in fields(cls)}
 
     def files(self, *names: str) -> list[Path]:
         """Return the files that the command line gave for some options."""
@@ -200,10 +176,10 @@ def keywords(
     def decorate(function: Callable[..., Result]) -> Callable[Concatenate[First, Second, Keywords], Result]:
         *sources, _ = inspect.signature(function).parameters.values()
         listed, ours = "", []
-        for each in fields(known):
+        for each in known.each().values():
             by_name = inspect.Parameter.KEYWORD_ONLY
-            ours.append(inspect.Parameter(each.name, by_name, default=each.default, annotation=each.type))
-            listed += f"    {each.name}\n        {each.metadata['option'].sentence(each.default)}\n"
+            ours.append(inspect.Parameter(each.name, by_name, default=each.default, annotation=each.annotation))
+            listed += f"    {each.name}\n        {each.sentence()}\n"
 
         signature = inspect.Signature([*sources, *ours])
 
@@ -223,74 +199,28 @@ def keywords(
     return decorate
 
 
-class Configured:
-    """Base of an estimator as in scikit-learn, which keeps its finger and its options."""
-
-    Options: ClassVar[type[Options]]
-
-    def __init__(self, finger: Any, **options: Any) -> None:
-        unknown = set(options) - set(self.Options.each())
-        if unknown:
-            raise TypeError(f"{type(self).__name__}: unexpected options {', '.join(sorted(unknown))}")
-        self.finger, self.options = finger, self.Options(**options)
-
-    def __getattr__(self, name: str) -> Any:
-        """Return an option, as scikit-learn's estimators have them."""
-        options = self.__dict__.get("options")
-        if options is None or name not in options.each():
-            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-        return getattr(options, name)
-
-    def get_params(self, deep: bool = True) -> dict[str, Any]:
-        """Return the constructor arguments by name."""
-        return {"finger": self.finger, **vars(self.options)}
-
-    def set_params(self: Made, **params: Any) -> Made:
-        """Set constructor arguments by name and return the object itself."""
-        known = self.get_params()
-        for name in params:
-            if name not in known:
-                raise ValueError(f"no parameter {name!r}; expected one of {', '.join(known)}")
-        Configured.__init__(self, **{**known, **params})
-        return self
-
-    def __repr__(self) -> str:
-        usual = vars(self.Options())
-        given = {name: value for name, value in self.get_params().items() if name not in usual or value != usual[name]}
-        return f"{type(self).__name__}({', '.join(f'{name}={value!r}' for name, value in given.items())})"
-
-
 # --- options of several commands --------------------------------------------------------------------------------------
 
 
 def _kinematics() -> Any:
     words = (f"{source}: {source.name.lower().replace('_', ' ')}" for source in KinematicsSource)
-    return option(1, number(1, 3, whole=True), ", ".join(words), metavar="1|2|3")
+    return option(1, ", ".join(words), "1|2|3", 1, 3)
 
 
 def _seed() -> Any:
-    return option(0, number(0, 2**53, whole=True), "seed of the random numbers", metavar="N")
+    return option(0, "seed of the random numbers", "N", 0, 2**53)
 
 
 def _jobs() -> Any:
-    return option(1, number(1, 1024, whole=True), "processor cores to use; no effect on the result", metavar="N")
+    return option(1, "processor cores to use; no effect on the result", "N", 1, 1024)
 
 
 def _false_alarms() -> Any:
-    return option(6.0, number(1e-3, 3600.0), "false alarms an hour in other free motion, at most", metavar="RATE")
+    return option(6.0, "false alarms an hour in other free motion, at most", "RATE", 1e-3, 3600.0)
 
 
-def _path(help: str, **shown: Any) -> Any:
-    return option(None, _PATH, help, **shown)
-
-
-def _recordings(help: str, metavar: str = "RECORDING", default: Any = ()) -> Any:
-    words, bracket, usual = help.partition(" [")
-    return option(default, _RECORDINGS, f"{words}; may be repeated{bracket}{usual}", metavar=metavar)
-
-
-def _progress(help: str) -> Any:
-    return option(None, _FUNCTION, help, shown=False)
+def _unseen(help: str) -> Any:
+    return option(None, help, shown=False)
 
 
 # --- the commands -----------------------------------------------------------------------------------------------------
@@ -301,20 +231,15 @@ class BuildOptions(Options):
     """Options of `build`."""
 
     reference: RecordingSource | None = option(
-        None, _RECORDING, "recording; the FMU carries its inputs and outputs for checks", metavar="REC"
+        None, "recording; the FMU carries its inputs and outputs for checks", "REC"
     )
-    ssv: Sequence[File] = option((), _PATHS, "parameter set that the FMU carries; may be repeated", metavar="SET.ssv")
-    binaries: File | None = _path("folder of binaries by FMI platform [default: those installed]", metavar="DIR")
-    fmi: int = option(2, number(2, 3, whole=True), "version of FMI; 3: forces and torques as arrays", metavar="2|3")
+    ssv: Sequence[File] = option((), "parameter set that the FMU carries", "SET.ssv")
+    binaries: File | None = option(None, "folder of binaries by FMI platform [default: those installed]", "DIR")
+    fmi: int = option(2, "version of FMI; 3: forces and torques as arrays", "2|3", 2, 3)
     sample_at: str = option(
-        "begin",
-        choice("begin", "end"),
-        "end: for masters that hand over the inputs of a step's end",
-        metavar="begin|end",
+        "begin", "end: for masters that hand over the inputs of a step's end", texts=("begin", "end")
     )
-    c_array: bool = option(
-        False, _YES, "write the finger as a C source for a microcontroller, in place of an FMU", names=("--c-array",)
-    )
+    c_array: bool = option(False, "write the finger as a C source for a microcontroller, in place of an FMU")
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -322,40 +247,24 @@ class RunOptions(Options):
     """Options of `run`."""
 
     kinematics: int = _kinematics()
-    progress: Callable[[int], None] | None = _progress("called with the number of samples done")
+    progress: Callable[[int], None] | None = _unseen("called with the number of samples done")
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class ExciteOptions(Options):
     """Options of `excite`."""
 
-    duration: float = option(400.0, number(1.0, 1e5), "per pretension, in all with --alternate", metavar="SECONDS")
-    max_speed: float = option(1.0, number(1e-3, 100.0), "limit for every joint", metavar="RAD/S")
-    range_: Sequence[str] = option(
-        (),
-        _TEXTS,
-        "joint range in rad, by number or name; may be repeated",
-        metavar="JOINT=LOW:HIGH",
-        names=("--range",),
-    )
-    pretension: Sequence[float] = option(
-        (),
-        several("a number or a list of numbers, 0.001 to 1000000", number(1e-3, 1e6)),
-        "mean tendon force; may be repeated [default: 10]",
-        metavar="NEWTON",
-    )
-    alternate: float | None = option(
-        None, number(1.0, optional=True), "time between changes of the pretension", metavar="SECONDS"
-    )
+    duration: float = option(400.0, "per pretension, in all with --alternate", "SECONDS", 1.0, 1e5)
+    max_speed: float = option(1.0, "limit for every joint", "RAD/S", 1e-3, 100.0)
+    range_: Sequence[str] = option((), "joint range in rad, by number or name", "JOINT=LOW:HIGH")
+    pretension: Sequence[float] = option((), "mean tendon force [default: 10]", "NEWTON", 1e-3, 1e6)
+    alternate: float | None = option(None, "time between changes of the pretension", "SECONDS", 1.0)
     vary_tension: str | None = option(
-        None,
-        kind("a text", str, optional=True),
-        "in N; vary the tension of each tendon in turn, without a pretension",
-        metavar="LOW:HIGH",
+        None, "in N; vary the tension of each tendon in turn, without a pretension", "LOW:HIGH"
     )
-    vary_every: float = option(10.0, number(2.0, 1e5), "time between changes of the tensions", metavar="SECONDS")
-    max_acceleration: float = option(10.0, number(0.1, 1e4), "limit for every joint", metavar="RAD/S²")
-    rate: float = option(100.0, number(20.0, 10000.0), "rows per second", metavar="HZ")
+    vary_every: float = option(10.0, "time between changes of the tensions", "SECONDS", 2.0, 1e5)
+    max_acceleration: float = option(10.0, "limit for every joint", "RAD/S²", 0.1, 1e4)
+    rate: float = option(100.0, "rows per second", "HZ", 20.0, 10000.0)
     seed: int = _seed()
 
 
@@ -363,46 +272,34 @@ class ExciteOptions(Options):
 class FitOptions(Options):
     """Options of `fit`."""
 
-    method: str = option("batch", choice("batch", "ekf"), "maximum likelihood or Kalman filter", metavar="batch|ekf")
-    holdout: float = option(0.0, number(0.0, 0.9), "share of the time not used in the fit", metavar="SHARE")
-    holdout_block: float = option(10.0, number(1.0), "longest block left out", metavar="SECONDS")
+    method: str = option("batch", "maximum likelihood or Kalman filter", texts=("batch", "ekf"))
+    holdout: float = option(0.0, "share of the time not used in the fit", "SHARE", 0.0, 0.9)
+    holdout_block: float = option(10.0, "longest block left out", "SECONDS", 1.0)
     kinematics: int = _kinematics()
-    routing: bool = option(
-        False, _YES, "first learn moment arms, stiffness and zeros, by joint_position", names=("--routing",)
-    )
+    routing: bool = option(False, "first learn moment arms, stiffness and zeros, by joint_position")
     # patterns of paths: which numbers are estimated, kept, and share one value
-    only: Sequence[str] = option((), _TEXTS, "estimate only these numbers; may be repeated", metavar="PATTERN")
-    fix: Sequence[str] = option((), _TEXTS, "keep these numbers fixed; may be repeated", metavar="PATTERN")
-    share: Sequence[str] = option(
-        (), _TEXTS, "laws that share one set of values; may be repeated", metavar="tendons|pulleys|PATTERN"
-    )
+    only: Sequence[str] = option((), "estimate only these numbers", "PATTERN")
+    fix: Sequence[str] = option((), "keep these numbers fixed", "PATTERN")
+    share: Sequence[str] = option((), "laws that share one set of values", "tendons|pulleys|PATTERN")
     asymmetric: bool | None = option(
-        None, _YES_OR_NONE, "fit the two sides of a law apart, or as one", names=("--asymmetric/--symmetric",)
+        None, "fit the two sides of a law apart, or as one", names=("--asymmetric/--symmetric",)
     )
     prior: float | None = option(
         None,
-        number(1e-6, 1e6, optional=True),
         "by how much the given numbers are off / expected magnitude [default: learned from the data]",
-        metavar="RATIO",
+        "RATIO",
+        1e-6,
+        1e6,
     )
-    scale: Sequence[str] = option(
-        (), _TEXTS, "expected magnitude, instead of the description's", metavar="PATTERN=VALUE"
+    scale: Sequence[str] = option((), "expected magnitude, instead of the description's", "PATTERN=VALUE")
+    previous: File | None = option(
+        None, "report or description of an earlier fit, as the prior", "PREVIOUS.json", names=("--from",)
     )
-    previous: File | None = _path(
-        "report or description of an earlier fit, as the prior", metavar="PREVIOUS.json", names=("--from",)
-    )
-    effective_samples: bool = option(
-        True,
-        _YES,
-        "count correlated residuals as fewer samples",
-        names=("--effective-samples/--no-effective-samples",),
-    )
-    passes: int | None = option(
-        None, number(1, whole=True, optional=True), "most passes over the data [default: 60; ekf: 2]", metavar="N"
-    )
-    tolerance: float = option(0.3, number(1e-9, 0.5), "batch: last step, in standard errors", metavar="SIZE")
-    drift: float = option(0.0, number(0.0, 1.0), "ekf: relative variance of the numbers per s", metavar="RATE")
-    progress: Callable[[Any], bool | None] | None = _progress("called with each `FitProgress`; returns False to stop")
+    effective_samples: bool = option(True, "count correlated residuals as fewer samples")
+    passes: int | None = option(None, "most passes over the data [default: 60; ekf: 2]", "N", 1)
+    tolerance: float = option(0.3, "batch: last step, in standard errors", "SIZE", 1e-9, 0.5)
+    drift: float = option(0.0, "ekf: relative variance of the numbers per s", "RATE", 0.0, 1.0)
+    progress: Callable[[Any], bool | None] | None = _unseen("called with each `FitProgress`; returns False to stop")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -416,43 +313,46 @@ class FitOptions(Options):
 class FitArguments(FitOptions):
     """What `fit` takes beside finger and recordings."""
 
-    compare: RecordingSources = _recordings("recording to judge, not to fit")
+    compare: RecordingSources = option((), "recording to judge, not to fit", "RECORDING")
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class CalibrateOptions(Options):
     """Options of `calibrate`."""
 
-    test: RecordingSources = _recordings("free motion that only judges the result [default: parts of FREE]", "FREE")
-    pushes: RecordingSources = _recordings("recordings with labelled contact, to count what is found", "LABELLED")
-    previous: File | None = _path(
+    test: RecordingSources = option((), "free motion that only judges the result [default: parts of FREE]", "FREE")
+    pushes: RecordingSources = option((), "recordings with labelled contact, to count what is found", "LABELLED")
+    previous: File | None = option(
+        None,
         "finger.json of an earlier calibration, or report of a fit, as the prior; for little data",
-        metavar="PREVIOUS.json",
+        "PREVIOUS.json",
         names=("--from",),
     )
-    folder: File | None = _path("folder for the results of the steps: a repeated call goes on there", shown=False)
+    folder: File | None = _unseen("folder for the results of the steps: a repeated call goes on there")
     false_alarms_per_hour: float = _false_alarms()
     kinematics: int = _kinematics()
     seed: int = _seed()
     jobs: int = _jobs()
-    progress: Callable[[PhaseState], None] | None = _progress("called with each `PhaseState`")
+    progress: Callable[[PhaseState], None] | None = _unseen("called with each `PhaseState`")
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class DiagnoseOptions(Options):
     """Options of `diagnose`."""
 
-    test: RecordingSources = _recordings("recordings to measure the gain on, not to fit [default: parts of RECORDING]")
-    reference: RecordingSources | None = _recordings(
-        "recordings of the same finger when healthy, to find what has changed since; best the same motion", default=None
+    test: RecordingSources = option(
+        (), "recordings to measure the gain on, not to fit [default: parts of RECORDING]", "RECORDING"
+    )
+    reference: RecordingSources | None = option(
+        None,
+        "recordings of the same finger when healthy, to find what has changed since; best the same motion",
+        "RECORDING",
     )
     kinematics: int = _kinematics()
-    least_gain: float = option(
-        0.03, number(0.0, 0.5), "least drop of the rms on unseen data for a cause", metavar="SHARE"
-    )
+    least_gain: float = option(0.03, "least drop of the rms on unseen data for a cause", "SHARE", 0.0, 0.5)
     seed: int = _seed()
     jobs: int = _jobs()
-    progress: Callable[[PhaseState], None] | None = _progress("called with each `PhaseState`")
+    progress: Callable[[PhaseState], None] | None = _unseen("called with each `PhaseState`")
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -460,22 +360,18 @@ class TuneOptions(Options):
     """Options of `tune`."""
 
     false_alarms_per_hour: float = _false_alarms()
-    method: str = option(
-        "bands", choice("bands", "paper"), "contact.method; paper is the rule of the paper", metavar="bands|paper"
-    )
-    bias_time: float | None = option(
-        None, number(1e-3, 1e4, optional=True), "time constant of the bias [default: unchanged]", metavar="SECONDS"
-    )
+    method: str = option("bands", "contact.method; paper is the rule of the paper", texts=("bands", "paper"))
+    bias_time: float | None = option(None, "time constant of the bias [default: unchanged]", "SECONDS", 1e-3, 1e4)
     kinematics: int = _kinematics()
-    progress: Callable[[int, int], None] | None = _progress("called with steps done and steps")
+    progress: Callable[[int, int], None] | None = _unseen("called with steps done and steps")
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class ScoreOptions(Options):
     """Options of `score`."""
 
-    labels: str | None = option(None, _COLUMN, "1 in contact, else 0 [default: contact, if present]", metavar="COLUMN")
-    force: str | None = option(None, _COLUMN, "sensed force in N, reported at each alarm and drawn", metavar="COLUMN")
+    labels: Column | None = option(None, "1 in contact, else 0 [default: contact, if present]", "COLUMN")
+    force: Column | None = option(None, "sensed force in N, reported at each alarm and drawn", "COLUMN")
     kinematics: int = _kinematics()
     seed: int = _seed()
-    progress: Callable[[int, int], None] | None = _progress("called with runs done and runs")
+    progress: Callable[[int, int], None] | None = _unseen("called with runs done and runs")

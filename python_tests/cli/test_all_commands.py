@@ -26,7 +26,7 @@ from repository_paths import ROOT
 from tendonfmu.commands.program import app
 
 GROUP: Any = typer.main.get_command(app)
-COMMANDS = dict(GROUP.commands)
+COMMANDS = {name: GROUP.get_command(None, name) for name in GROUP.commands}
 EXAMPLES = ROOT / "examples"
 
 # Enough of each command that it starts, and what it calls first of the package, so that a test can make it fail.

@@ -21,10 +21,10 @@ from tendonfmu.diagnosis.effects import MECHANISMS, Place, Variant, by_name
 from tendonfmu.diagnosis.effects.mechanism import add_to_number
 from tendonfmu.diagnosis.extension_fit import number_columns
 from tendonfmu.diagnosis.samples import Samples, Span, span_of
-from tendonfmu.estimate import unknowns
 from tendonfmu.model import native, own_copy
-from tendonfmu.model.description import Finger
-from tendonfmu.model.friction_places import balanced_forces, moment_arms
+from tendonfmu.model.balance import balanced_forces
+from tendonfmu.model.description import Finger, finger_of
+from tendonfmu.model.friction_places import friction_numbers, moment_arms
 from tendonfmu.recordings.prepared import FitRecording, Held, prepare
 from tendonfmu.recordings.recording import Recording
 
@@ -93,7 +93,7 @@ def moved(data: Data, seconds: float, seed: int, gap: bool = False) -> Recording
         "joint_position": angle,
         "joint_velocity": np.gradient(angle, time, axis=0),
     }
-    force = balanced_forces(data, motion, 10 + 2 * np.sin(2 * np.pi * time / 11))
+    force = balanced_forces(finger_of(data), motion, 10 + 2 * np.sin(2 * np.pi * time / 11))
     position = angle @ moment_arms(data).T + force / 8000.0
     force += 0.002 * draw.standard_normal(force.shape)
     if gap:
@@ -250,7 +250,9 @@ def assert_all_columns(case: Case, name: str) -> None:
 
 def test_columns_of_numbers_are_differences_of_the_core(case: Case) -> None:
     columns, scale = number_columns(case.data, case.samples)
-    listed = [number for number in unknowns(case.data) if number.key != "stribeck_velocity" and number.key != "static"]
+    listed = [
+        number for number in friction_numbers(case.data) if number.key != "stribeck_velocity" and number.key != "static"
+    ]
     assert columns.shape[2] == len(scale) >= len(listed)
     for number in listed:
         expected = by_difference(case, case.data, {number.path: 1.0}, 1e-4 * number.reference)
@@ -265,10 +267,10 @@ def test_columns_of_numbers_are_differences_of_the_core(case: Case) -> None:
 @pytest.mark.parametrize("name", CONTRACT)
 def test_a_fit_estimates_what_is_added(case: Case, name: str) -> None:
     """All numbers of the term, also from magnitudes of 0: what is 0 would stay 0."""
-    before = {number.path for number in unknowns(case.data)}
+    before = {number.path for number in friction_numbers(case.data)}
     for proposal, variant in case.proposals(name):
         extended = proposal.mechanism.extended(case.data, proposal.place, variant.shape, [0.0] * variant.count)
-        added = {number.path for number in unknowns(extended)} - before
+        added = {number.path for number in friction_numbers(extended)} - before
         wanted = {f"extensions[{len(extended['extensions'])}]."} if variant.rows or variant.full is not None else set()
         for path in () if wanted else (path for column in variant.columns for path in column.numbers):
             wanted.add(path)

@@ -29,7 +29,8 @@ from tendonfmu.diagnosis.samples import Samples, exact_model
 from tendonfmu.errors import InputError
 from tendonfmu.files.json_node import Node
 from tendonfmu.files.tables import write_table
-from tendonfmu.model.friction_places import moment_arms, pretension_vector
+from tendonfmu.model.balance import pretension_vector
+from tendonfmu.model.friction_places import moment_arms
 from tendonfmu.recordings.prepared import FitRecording
 from tendonfmu.simulate.motion_plan import Joints, expand_motion
 

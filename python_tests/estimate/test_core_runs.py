@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from fit_cases import small_finger
 from fit_finger import made_recording
 from tendonfmu.estimate.core_runs import CoreRuns, SlowDrift, slowest_drift
-from tendonfmu.model import finger_from_data, native, without_learning
+from tendonfmu.model import finger_from_data, finger_of, native
 from tendonfmu.recordings import FitRecording, Held, Recording, prepare
 
 REMEMBERING = {"effect": "presliding", "displacement": 0.4}
@@ -29,8 +29,9 @@ def prepared(recording: Recording, kinematics: int = 3) -> FitRecording:
 
 def test_it_leaves_the_torque_less_friction_and_known_load() -> None:
     recording, data = made_recording(rate=200.0), finger(REMEMBERING)
-    runs = CoreRuns(data, [prepared(recording)])
-    outputs = native.run_recording(without_learning(data), recording.arrays(), 3)
+    runs = CoreRuns(finger_of(data), [prepared(recording)])
+    still = {"drift_variance": 0.0, "initial_variance": 0.0, "initial_torque": [0.0, 0.0]}
+    outputs = native.run_recording({**data, "bias": still, "contact": {"threshold": [1e9, 1e9]}}, recording.arrays(), 3)
     expected = outputs["compensated_torque"] - recording.groups["external_torque"]
     whole = expected[: len(expected) // 2 * 2].reshape(-1, 2, 2).mean(axis=1)  # blocks of 10 ms
     np.testing.assert_allclose(runs.residual(), whole, rtol=0, atol=1e-15)
@@ -41,14 +42,14 @@ def test_a_place_that_sticks_holds_its_friction() -> None:
     quiet = small_finger()
     quiet["bias"] |= {"forget_rate": 0.0, "drift_variance": 0.0, "noise_std": 1e-9, "initial_variance": 0.0}
     recording = made_recording(rate=200.0)
-    runs = CoreRuns(finger(), [prepared(recording)])
+    runs = CoreRuns(finger_of(finger()), [prepared(recording)])
     left = SlowDrift(runs.time, runs.stretch, runs.used).without(runs.residual())
     assert np.sqrt(np.mean(left**2)) < 0.012  # of 40 mN·m; the made bias wanders and jumps as its forget rate says
 
 
 def test_columns_are_derivatives() -> None:
     data = finger(REMEMBERING)
-    runs = CoreRuns(data, [prepared(made_recording(rate=200.0))], threads=2)
+    runs = CoreRuns(finger_of(data), [prepared(made_recording(rate=200.0))], threads=2)
     paths = [
         "tendons[1].edge_friction[1].coulomb",
         "joints[1].friction.stribeck_velocity",
@@ -75,7 +76,7 @@ def test_columns_are_derivatives() -> None:
 def test_fast_recordings_are_thinned() -> None:
     recording = prepared(made_recording(rate=1000.0, duration=10.0))
     data = finger(REMEMBERING)
-    every, thin = (CoreRuns(data, [recording], rate=rate).residual() for rate in (np.inf, 400.0))
+    every, thin = (CoreRuns(finger_of(data), [recording], rate=rate).residual() for rate in (np.inf, 400.0))
     assert 0.0 < np.sqrt(np.mean((every - thin) ** 2)) < 2e-4  # N·m, of 40 mN·m of friction
 
 

@@ -96,7 +96,7 @@ def test_solution_is_stationary_and_reported_truly() -> None:
     expected = np.linalg.inv(information * np.outer(scale, scale) + np.eye(len(scale)) / 4.0) * np.outer(scale, scale)
     ratio = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
     np.testing.assert_allclose(result.covariance / ratio, expected / ratio, rtol=0.0, atol=1e-8)
-    assert result.passes >= result.steps >= 1 and result.seconds > 0.0
+    assert result.passes >= result.steps >= 1
 
 
 def no_stribeck_in_truth() -> tuple[Description, Recording]:

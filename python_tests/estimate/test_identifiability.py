@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 
 from excite_fingers import SMALL, SMALL_RANGES
-from tendonfmu.estimate.fisher_information import information, noise_of, sensitivities, unknowns
+from tendonfmu.estimate.fisher_information import information, noise_of, sensitivities
 from tendonfmu.excite.excitation import Plan, plan_excitation
 from tendonfmu.excite.training_motion import as_array, excite, find_ranges, read_subject, report
 from tendonfmu.model import native
-from tendonfmu.model.friction_places import balanced_forces
+from tendonfmu.model.balance import balanced_forces
+from tendonfmu.model.description import finger_of
+from tendonfmu.model.friction_places import friction_numbers
 
 
 @pytest.fixture
@@ -27,7 +29,7 @@ def small_file(tmp_path: Path) -> Path:
 def small_samples(data: dict[str, Any], duration: float = 60.0) -> dict[str, np.ndarray]:
     motion = plan_excitation(data, Plan(SMALL_RANGES, duration=duration, rate=50))
     samples = {name: getattr(motion, name) for name in ("time", "joint_position", "joint_velocity")}
-    return samples | {"tendon_force": balanced_forces(data, samples, motion.pretension)}
+    return samples | {"tendon_force": balanced_forces(finger_of(data), samples, motion.pretension)}
 
 
 def innovations(data: dict[str, Any], samples: dict[str, np.ndarray], change: dict[str, float]) -> np.ndarray:
@@ -52,16 +54,15 @@ def test_information_is_that_of_the_cores_own_innovations() -> None:
     """Bundled runs, shared out and filtered in numpy, against one run of the whole core per number."""
     bias = {"drift_variance": 1e-4, "noise_std": 0.02, "noise_time": 0.01, "initial_variance": 1e-3, "forget_rate": 2.0}
     data = {**SMALL, "bias": bias}
-    samples, numbers = small_samples(data), unknowns(SMALL)
+    samples, numbers = small_samples(data), friction_numbers(SMALL)
     force = np.abs(samples["tendon_force"]).mean(axis=1)
-    found = information(sensitivities(data, numbers, samples), samples["time"], force, noise_of(data, 0.02))
+    found = information(sensitivities(finger_of(data), numbers, samples), samples["time"], force, noise_of(data, 0.02))
     plain = innovations(data, samples, {})
     slopes = []
     for number in numbers:
         step = (-1e-5 if number.key == "coulomb" and number.with_path is None else 1e-5) * number.reference
-        paths = [path for path in (number.path, number.with_path) if path]
         slopes.append(
-            (innovations(data, samples, dict.fromkeys(paths, step)) - plain).ravel() / step * number.reference
+            (innovations(data, samples, dict.fromkeys(number.paths, step)) - plain).ravel() / step * number.reference
         )
     expected = np.array(slopes) @ np.array(slopes).T
     scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
@@ -73,10 +74,10 @@ def test_standard_errors_are_those_of_estimates() -> None:
     """A fit of simulated recordings scatters as foretold: cover and base friction of the small finger."""
     bias = {"drift_variance": 0.0, "noise_std": 0.02, "noise_time": 0.02, "initial_variance": 1e6, "forget_rate": 2.0}
     data = {**SMALL, "bias": bias}
-    samples, numbers = small_samples(data), unknowns(SMALL)
+    samples, numbers = small_samples(data), friction_numbers(SMALL)
     chosen = [k for k, number in enumerate(numbers) if number.path.startswith("joints[1]")]
     force = np.abs(samples["tendon_force"]).mean(axis=1)
-    changes = np.concatenate(list(sensitivities(data, numbers, samples)))[:, :, chosen]
+    changes = np.concatenate(list(sensitivities(finger_of(data), numbers, samples)))[:, :, chosen]
     known = information([changes.copy()], samples["time"], force, noise_of(data, 0.02))
     columns = np.column_stack([changes[:, 0], np.ones(len(changes))])  # and a constant bias
     random = np.random.default_rng(5)

@@ -38,7 +38,7 @@ CORDS = {"effect": "cord_stretch", "stiffness": 2e4}
 def test_they_are_the_differences_of_runs(rows: tuple[dict[str, Any], ...]) -> None:
     given = finger_from_data(finger(*rows), Path("small.json"))
     structure = build_structure(given, Choice())
-    runs = CoreRuns(structure.start.data, [prepare(given, made_recording(rate=200.0), 3, Held())])
+    runs = CoreRuns(structure.start, [prepare(given, made_recording(rate=200.0), 3, Held())])
     estimator = Estimator(structure.start.image, structure.group, structure.scale)
     slopes = LawSlopes(structure, runs).at(estimator.start)
     drift = SlowDrift(runs.time, runs.stretch, runs.used)

@@ -18,12 +18,8 @@ from tendonfmu.estimate.identifiability import EffectCoverage, coverage_of, dura
 from tendonfmu.excite.excitation import ACCELERATION, Excitation, Plan, Variation, plan_excitation
 from tendonfmu.excite.training_motion import as_array, find_pretensions, find_ranges, read_subject
 from tendonfmu.files.tables import read_table
-from tendonfmu.model.friction_places import (
-    effects,
-    moment_arms,
-    pretension_vector,
-    working_point_weights,
-)
+from tendonfmu.model.balance import pretension_vector
+from tendonfmu.model.friction_places import effects, moment_arms, working_point_weights
 from tendonfmu.statistics.quintic import evaluate
 
 

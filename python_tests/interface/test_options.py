@@ -40,15 +40,13 @@ def test_a_function_has_the_options_of_its_command(
         for name, parameter in inspect.signature(function).parameters.items()
         if parameter.kind is inspect.Parameter.KEYWORD_ONLY
     }
-    assert signature == of_command.defaults()
+    assert signature == {name: option.default for name, option in of_command.each().items()}
     listed = (
         inspect.cleandoc(function.__doc__ or "").partition("Parameters\n----------\n")[2].partition("\n\nReturns")[0]
     )
     assert re.findall(r"^\w+$", listed, re.MULTILINE)[2:] == list(signature)
     for name, option in of_command.each().items():
-        assert re.search(
-            rf"^{name}\n    [A-Z1].* \({re.escape(option.values.words)}; default .*\)\.$", listed, re.MULTILINE
-        )
+        assert re.search(rf"^{name}\n    [A-Z1].* \({re.escape(option.words)}; default .*\)\.$", listed, re.MULTILINE)
 
 
 def test_its_sources_are_given_by_name_as_well() -> None:

@@ -13,6 +13,7 @@ import pandas as pd
 import pytest
 
 import tendonfmu as tf
+from random_fingers import random_case
 from repository_paths import ROOT
 
 FINGER = ROOT / "examples/demo_recording/two_joints.json"
@@ -107,6 +108,23 @@ def test_replace_makes_another_finger(finger: tf.Finger, tmp_path: Path) -> None
     assert finger == tf.read_finger(FINGER)
     found.write(tmp_path / "changed.json")
     assert tf.read_finger(tmp_path / "changed.json") == found
+
+
+def test_other_numbers_compile_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Any number of any random finger; the run has the bits of a finger that is compiled from the new description."""
+    for seed in range(4):
+        description, recording = random_case(seed, samples=60, extensions=True)
+        finger = tf.read_finger(description)
+        values = {path: number.start * 1.01 for path, number in finger.numbers.items() if path.endswith(".stiffness")}
+        values |= {"bias.forget_rate": 0.25}
+        with monkeypatch.context() as patch:
+            patch.setattr("tendonfmu.model.native.image_from_json", None)
+            changed = finger.replace(values).replace({"bias.noise_std": 0.02})
+            found = changed.instance(3).run(recording)
+        anew = tf.read_finger(changed.to_dict())
+        assert changed == anew and changed.numbers == anew.numbers and changed.image == anew.image
+        for name, expected in anew.instance(3).run(recording).items():
+            np.testing.assert_array_equal(found[name], expected, err_msg=name)
 
 
 @pytest.mark.parametrize(

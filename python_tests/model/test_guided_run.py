@@ -12,6 +12,7 @@ from oracle_guided import run_guided
 from random_fingers import Recording, intervals, random_case
 from repetitions import repeated
 from tendonfmu.model import native, without_detection
+from tendonfmu.model.description import finger_of
 from tendonfmu.recordings import run_parts
 
 FINGERS = range(600, 640)
@@ -83,7 +84,7 @@ def test_each_part_begins_anew(seed: int) -> None:
     learns, known = guidance(seed, len(description["joints"]))
     parts = [slice(0, 50), slice(55, SAMPLES)]
     whole: Recording = recording | {"external_torque": known}
-    made = run_parts(description, whole, parts, learns, 3)
+    made = run_parts(finger_of(description), whole, parts, learns, 3)
     assert np.isnan(made.residual[50:55]).all() and np.isnan(made.torque[50:55]).all()
     for part in parts:
         rows = {name: values[part] for name, values in recording.items()}

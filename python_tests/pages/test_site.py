@@ -6,6 +6,7 @@ import re
 import subprocess
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import typer
 
@@ -54,8 +55,9 @@ def test_links_lead_to_files_that_git_knows() -> None:
 
 def test_every_option_and_every_effect_is_in_the_reference() -> None:
     pages = "".join(path.read_text("utf-8") for path in (ROOT / "docs" / "reference" / "commands").glob("*.md"))
-    commands = typer.main.get_command(app).commands  # type: ignore[attr-defined]
-    options = {option for command in commands.values() for each in command.params for option in each.opts}
+    group: Any = typer.main.get_command(app)
+    commands = [group.get_command(None, name) for name in group.commands]
+    options = {option for command in commands for each in command.params for option in each.opts}
     named = set(re.findall(r"(?<![\w-])--?[a-z][\w-]*", pages))
     assert {option for option in options if option.startswith("-")} - named == set()
     assert [each.name for each in MECHANISMS if f"| `{each.name}` | {each.title} |" not in pages] == []

@@ -13,8 +13,7 @@ import pytest
 from tendonfmu.errors import InputError
 from tendonfmu.files.json_node import Node, Refusal
 from tendonfmu.files.tables import write_table
-from tendonfmu.simulate.motion_plan import PEAK_OVER_MEAN, Joints, Motion, Segment, expand_motion, expand_pushes
-from tendonfmu.statistics.random_numbers import Draws
+from tendonfmu.simulate.motion_plan import PEAK_OVER_MEAN, Draws, Joints, Motion, Segment, expand_motion, expand_pushes
 
 LIMITS = Joints([-0.35, -0.3, 0.0], [0.35, 1.4, 1.6])
 SEGMENTS = [

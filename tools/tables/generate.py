@@ -44,11 +44,11 @@ TEMPLATES = {
 # Name of the schema -> its title, its class, and modules of the package: that of the class is the last.
 TYPED = {
     "map": ("TendonFMU map of columns", "Map", "recordings/converters/map_types.py"),
-    "hand": ("TendonFMU hand", "HandFile", "commands/hand/hand_types.py"),
+    "hand": ("TendonFMU hand", "HandFile", "commands/hand/description.py"),
     "diagnosis": ("TendonFMU diagnosis", "DiagnosisReport", "report/diagnosis_types.py"),
-    "fit_report": ("TendonFMU fit report", "FitReport", "recordings/entry_types.py", "estimate/fit_types.py"),
-    "score_report": ("TendonFMU score report", "ScoreReport", "detect/score_types.py"),
-    "tune_report": ("TendonFMU tune report", "TuneReport", "detect/tune_types.py"),
+    "fit_report": ("TendonFMU fit report", "FitReport", "recordings/columns.py", "estimate/fit_report.py"),
+    "score_report": ("TendonFMU score report", "ScoreReport", "detect/summary.py"),
+    "tune_report": ("TendonFMU tune report", "TuneReport", "detect/tune_report.py"),
 }
 
 

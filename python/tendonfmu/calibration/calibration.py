@@ -30,6 +30,7 @@ from tendonfmu.calibration.report import (
     OF_SCORE,
     Delivered,
     Judged,
+    by_size,
     compared,
     left_out,
     record_next,
@@ -40,8 +41,7 @@ from tendonfmu.calibration.report import (
     typical_push,
     without_held_out,
 )
-from tendonfmu.detect import ContactTuning, TuneWarning, require_no_contact, score_recordings
-from tendonfmu.detect import score_report as detect_score_report
+from tendonfmu.detect import ContactTuning, TuneWarning, build_report, require_no_contact, score_recordings
 from tendonfmu.diagnosis import Diagnosis, diagnose
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import check_given_once, check_unseen, unseen_square
@@ -340,7 +340,7 @@ class _Run:
         """Fit with the previous numbers as the prior; keep those if new ones are no better on motion set apart."""
         case, inner = self._case, self._most()
         most = self._fitted_again([without_held_out(each.recording, HELD) for each in case.free])
-        before, after = (unseen_square(each.data, inner) for each in (case.finger, most.finger))
+        before, after = (unseen_square(each, inner) for each in (case.finger, most.finger))
         if after <= before:
             whole = self._fitted_again([each.recording for each in case.free])
             return {"finger": whole.finger.data, "most": most.finger.data, "warnings": list(whole.warnings)}
@@ -386,14 +386,14 @@ class _Run:
         scored = score_recordings(
             finger, self._case.pushes, options, progress=lambda done, total: step(done / max(total, 1))
         )
-        report: Mapping[str, Any] = detect_score_report.build_report(scored)
+        report = build_report(scored)
 
         def of(key: str) -> list[tuple[str, dict[str, Any]]]:
             return [(Path(each["path"]).name, row) for each in report["recordings"] for row in each[key]]
 
         return {
             **{key: report[key] for key in OF_SCORE},
-            "sizes": detect_score_report.by_size(scored, left),
+            "sizes": by_size(scored, left),
             "list": [{"recording": name, **{key: event[key] for key in OF_PUSH}} for name, event in of("event_list")],
             "false_alarm_list": [{"recording": name, **alarm} for name, alarm in of("false_alarm_list")],
             "warnings": list(scored.warnings),

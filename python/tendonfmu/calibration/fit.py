@@ -26,12 +26,11 @@ from tendonfmu.estimate import (
     read_previous_fit,
     settings_of,
     torque_scales,
-    unknowns,
     with_learned_numbers,
     with_previous_values,
 )
 from tendonfmu.files import read_json
-from tendonfmu.model import Finger, read_finger
+from tendonfmu.model import Finger, friction_numbers, read_finger
 from tendonfmu.recordings import FitRecording, Recording, at_rows
 
 DIAGNOSED = 90.0  # s of free motion, in all, to find the structure in
@@ -53,7 +52,7 @@ def fit_all(finger: Finger, recordings: Sequence[FitRecording], *, threads: int,
 
     Raises InputError.
     """
-    if not unknowns(finger.data):
+    if not friction_numbers(finger.data):
         return CalibratedFit(finger, (), ())
     events, _ = events_of(finger.data, Samples.of(finger.data, recordings, threads), seed)
     kept = [without_events(recording, events) for recording in recordings]

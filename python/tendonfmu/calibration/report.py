@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -158,6 +159,8 @@ OF_SCORE = (
     "free_rms",
     "overhang",
 )
+# of pushes: times the rms of the joint's residual, at the joint with the largest ratio
+SIZES = (1.5, 3.0, 6.0, math.inf)
 OF_PUSH = ("onset_s", "end_s", "largest_torque", "joint", "found", "at_release", "silent_before", "delay_s")
 
 
@@ -212,6 +215,37 @@ def typical_push(scored: Scored) -> dict[str, Any] | None:
         "felt": felt[rows, j].tolist(),
         "sensor": None if track.external is None else track.external[rows, j].tolist(),
     }
+
+
+def by_size(scored: Scored, left: Sequence[float]) -> list[dict[str, Any]] | None:
+    """Count the pushes, and those found, by the torque of a reference sensor over the residual of free motion."""
+    # left: [n] rms of the residual (N·m)
+    sizes, hits = [], []
+    scale = np.maximum(np.array(left), 1e-12)
+    for track, score in zip(scored.tracks, scored.scores, strict=True):
+        if track.external is None:
+            return None
+        for event in score.events:
+            touched = (track.recording.time >= event.onset) & (track.recording.time <= event.end)
+            sizes.append(float((np.abs(track.external[touched]) / scale).max()))
+            hits.append(event.found)
+    low, rows = 0.0, []
+    for high in SIZES:
+        inside = [hit for size, hit in zip(sizes, hits, strict=True) if low <= size < high]
+        if inside:
+            share = intervals.share(sum(inside), len(inside))
+            rows.append(
+                {
+                    "from": low,
+                    "below": None if math.isinf(high) else high,
+                    "events": len(inside),
+                    "found": sum(inside),
+                    "share": share.value,
+                    "interval": [share.low, share.high],
+                }
+            )
+        low = high
+    return rows
 
 
 def left_out(events: Sequence[Event]) -> list[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -10,7 +9,7 @@ from typing import Any, NamedTuple
 from tendonfmu.calibration.calibration import DIAGNOSIS, Calibration
 from tendonfmu.detect import tune_report
 from tendonfmu.drawing import Sheet
-from tendonfmu.files import check_output_folder, counted, report_text, whole_file, write_text
+from tendonfmu.files import check_output_folder, counted, report_text, write_bytes, write_text
 from tendonfmu.fmu import build_fmu
 from tendonfmu.report import (
     Row,
@@ -322,8 +321,7 @@ def _write_diagnosis(calibration: Calibration, folder: Path) -> None:
         return
     folder.mkdir(exist_ok=True)
     for file in filter(Path.is_file, made.iterdir()):
-        with whole_file(folder / file.name) as copy:
-            shutil.copyfile(file, copy)
+        write_bytes(folder / file.name, file.read_bytes())
 
 
 def sheets(calibration: Calibration) -> Iterator[Sheet]:

@@ -7,6 +7,7 @@ Every command takes `--json` and `--quiet`; a command with options shared by sev
 from __future__ import annotations
 
 import inspect
+import math
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -155,8 +156,7 @@ def _parameters(function: Callable[..., None], options: type[Options] | None) ->
     # get_type_hints of Python 3.10 makes Optional[Annotated[...]] of a default None
     for name, parameter in inspect.signature(function, eval_str=True).parameters.items():
         if name == "options" and options is not None:
-            usual = options.defaults()
-            parameters += [_option(field, each, usual[field]) for field, each in options.each().items() if each.shown]
+            parameters += [_option(each) for each in options.each().values() if each.shown]
         else:
             parameters.append(parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY))
     for name, annotation in _OF_ALL.items():
@@ -165,15 +165,23 @@ def _parameters(function: Callable[..., None], options: type[Options] | None) ->
     return parameters
 
 
-def _option(name: str, option: Option, default: Any) -> inspect.Parameter:
+def _option(option: Option) -> inspect.Parameter:
     """Make the parameter of an option."""
-    values = option.values
-    shown = typer.Option(*option.names, metavar=option.metavar, help=option.help, **values.limits)  # type: ignore[arg-type]
+    words, bracket, usual = option.help.partition(" [")
+    plain = f"--{option.name.rstrip('_').replace('_', '-')}"  # alone: no --no-NAME
+    limits: Any = {"min": option.least, "max": None if option.most == math.inf else option.most}
+    shown: Any = typer.Option(
+        *(option.names or ((plain,) if option.default is False or option.name.endswith("_") else ())),
+        metavar="|".join(option.texts) or option.metavar,
+        help=words + "; may be repeated" * option.several + bracket + usual,
+        **(limits if option.least is not None else {}),
+    )
+    kind: Any = list[option.kind] if option.several else option.kind  # type: ignore[name-defined]
     return inspect.Parameter(
-        name,
+        option.name,
         inspect.Parameter.KEYWORD_ONLY,
-        default=None if isinstance(default, tuple) else default,
-        annotation=Annotated[values.type, shown],
+        default=None if option.several else option.default,
+        annotation=Annotated[kind | None if option.optional or option.several else kind, shown],
     )
 
 

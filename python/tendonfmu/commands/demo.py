@@ -13,8 +13,9 @@ the two-joint finger are left out.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Annotated, Any
@@ -29,7 +30,7 @@ from tendonfmu.commands.console import Bar, print_json, print_results, say, say_
 from tendonfmu.commands.fit import fit
 from tendonfmu.commands.run import run
 from tendonfmu.commands.score import score
-from tendonfmu.files import check_output_folder, whole_file, write_text
+from tendonfmu.files import check_output_folder, write_bytes, write_text
 from tendonfmu.model import read_finger
 from tendonfmu.tasks import forget_steps
 
@@ -96,9 +97,9 @@ class Story:
         page, copied = self.folder / PAGE, self.folder / "data"
         copied.mkdir(exist_ok=True)
         for file in DATA.iterdir():
-            with whole_file(copied / file.name) as temporary:
-                temporary.write_bytes(file.read_bytes())
-            self.files[copied / file.name] = "built-in data, which the examples of --help use"
+            self.files[write_bytes(copied / file.name, file.read_bytes())] = (
+                "built-in data, which the examples of --help use"
+            )
         sheets = [replace(sheet, section=each.name) for each in self.chapters for sheet in each.sheets]
         written = [(path.relative_to(self.folder).as_posix(), what) for path, what in self.files.items()]
         content = {"chapters": self.chapters, "missing": self.missing, "files": written}
@@ -142,25 +143,15 @@ class Story:
     def _diagnose(self, data: Path, phase: Phase) -> Chapter:
         """Show what the calibration has found."""
         del data, phase
-        found = self._calibrated.calibration.diagnosis
+        found, words = self._calibrated.calibration.diagnosis, reporting.diagnosis_text
         assert found is not None, "no step was there to be repeated"
-        factor, unit = reporting.diagnosis_text.unit_of(found)
-        errors = (
-            reporting.rounded(factor * reporting.together(model.test_rms)) for model in (found.nominal, found.extended)
-        )
-        tile = reporting.Tile(
-            " → ".join(errors), unit, "error on held-out parts, before and after the causes are built in"
-        )
+        factor, unit = words.unit_of(found)
+        before, after = (factor * reporting.together(model.test_rms) for model in (found.nominal, found.extended))
+        meaning = "error on held-out parts, before and after the causes are built in"
         sheets = [sheet for sheet in reporting.diagnosis_sheets(found) if sheet.section != "views"]
-        tables, lines = list(reporting.diagnosis_text.tables(found)), list(reporting.diagnosis_text.lines(found))
-        return Chapter(
-            "diagnose",
-            tile,
-            tables,
-            lines,
-            sheets,
-            f"calibration/{calibration.DIAGNOSIS}/{reporting.diagnosis_page.PAGE}",
-        )
+        page = f"calibration/{calibration.DIAGNOSIS}/{reporting.diagnosis_page.PAGE}"
+        tile = _fell(before, after, unit, meaning)
+        return Chapter("diagnose", tile, list(words.tables(found)), list(words.lines(found)), sheets, page)
 
     def _fit(self, data: Path, phase: Phase) -> Chapter:
         fitted = fit(
@@ -175,41 +166,29 @@ class Story:
         fitted.write(folder / "fitted.json")
         self.files[folder / "fitted.json"] = "the fitted description"
         residuals = reporting.residual_tables(picture.report, picture.fitted.joint_names)
-        start, end = (reporting.rounded(value) for value in (residuals[-1].all.start, residuals[-1].all.fitted))
-        tile = reporting.Tile(
-            f"{start} → {end}", residuals[-1].unit, "error on an unseen recording, before and after the fit"
-        )
+        *_, unseen = residuals
+        meaning = "error on an unseen recording, before and after the fit"
+        tile = _fell(unseen.all.start, unseen.all.fitted, unseen.unit, meaning)
         sheets = [list(reporting.torque_sheets(picture))[-1]]
         sheets += [sheet for sheet in reporting.law_sheets(picture) if sheet.name == "laws_joints"]
-        lines = list(reporting.fit_page.summary_sentences(picture, residuals))
-        return Chapter(
-            "fit",
-            tile,
-            [next(reporting.fit_page.tables(fitted.estimator))],
-            lines,
-            sheets,
-            f"fit/{reporting.fit_page.PAGE}",
-        )
+        lines, page = list(reporting.fit_page.summary_sentences(picture, residuals)), f"fit/{reporting.fit_page.PAGE}"
+        return Chapter("fit", tile, [next(reporting.fit_page.tables(fitted.estimator))], lines, sheets, page)
 
     # --- chapters: the index finger -----------------------------------------------------------------------------------
 
     def _detect(self, data: Path, phase: Phase) -> Chapter:
-        def show(done: int, total: int) -> None:
-            phase("running the finger", done, total)
-
         fmu = self.folder / FMU
         build(data / INDEX, fmu)
         self.files[fmu] = "the calibrated index finger's FMU"
         pushes = data / f"{PUSHES}.parquet"
+        show = partial(phase, "running the finger")
         after, before = (score(data / finger, pushes, progress=show) for finger in (INDEX, GIVEN))
         self.files |= reporting.write_score_figures(after.scored, self.folder / "score")
         tile = reporting.Tile(f"{after.found} of {after.events}", "", "pushes found, without a touch sensor")
         as_given = f"as given: {before.found} of {before.events} pushes found"
-        lines = [*reporting.detection.score_lines(after.report), as_given]
-        sheet = next(reporting.score_sheets(after.scored))
-        return Chapter(
-            "detect", tile, list(reporting.detection.score_tables(after.report)), lines, [sheet], "score/score.html"
-        )
+        lines = [*reporting.detection.score_lines(after.scored), as_given]
+        tables, sheet = list(reporting.detection.score_tables(after.scored)), next(reporting.score_sheets(after.scored))
+        return Chapter("detect", tile, tables, lines, [sheet], "score/score.html")
 
     def _run(self, data: Path, phase: Phase) -> Chapter:
         finger, fmu = read_finger(data / INDEX), self.folder / FMU
@@ -230,15 +209,16 @@ class Story:
             lines.append(f"free motion at {force}: {result.summary}")
             headings.append(f"at {force}")
             reports.append(report)
-        rows = [tuple(row) for row in zip(finger.joint_names, *map(_left, reports), strict=True)]
+        left = ([_pair(joint) for joint in report["joints"]] for report in reports)
+        rows = [tuple(row) for row in zip(finger.joint_names, *left, strict=True)]
         title = f"{finger.name}: joint torque → left after compensation, rms in mN·m"
         joint = reports[0]["joints"][finger.joint_names.index(SHOWN)]
         tile = reporting.Tile(_pair(joint), "mN·m", "torque at the base of the finger, before and after compensation")
         return Chapter("run", tile, [(title, tuple(headings), rows)], lines, sheets, f"{FREE}.html")
 
 
-def _left(report: dict[str, Any]) -> Iterator[str]:
-    return map(_pair, report["joints"])
+def _fell(before: float | None, after: float | None, unit: str, meaning: str) -> reporting.Tile:
+    return reporting.Tile(f"{reporting.rounded(before)} → {reporting.rounded(after)}", unit, meaning)
 
 
 def _pair(joint: dict[str, Any]) -> str:

@@ -7,10 +7,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
-from tendonfmu.model import FingerSource, native, read_finger
+from tendonfmu.model import INPUTS, FingerSource, native, read_finger
 from tendonfmu.options import RunOptions
 
-_INPUTS = ("tendon_force", "tendon_position", "joint_position", "joint_velocity")
 _MASKED = np.ma.MaskedArray
 
 
@@ -138,7 +137,7 @@ class Runner:
 
     def _take_converted(self, time: float, given: tuple[ArrayLike | None, ...]) -> None:
         """Take a sample of anything that numpy makes arrays of."""
-        arrays = [_row(name, values) for name, values in zip(_INPUTS, given, strict=True)]
+        arrays = [_row(name, values) for name, values in zip(INPUTS, given, strict=True)]
         with native.refusals_of(f"sample at {time!r} s"):
             self._take(_number(time), *arrays)
 
@@ -185,7 +184,7 @@ def _row(name: str, values: ArrayLike | None) -> Numbers | None:
 
 def _refuse_masked(given: tuple[ArrayLike | None, ...]) -> None:
     """Raise InputError if a value is masked: the native part would read what is under the mask."""
-    for name, values in zip(_INPUTS, given, strict=True):
+    for name, values in zip(INPUTS, given, strict=True):
         if np.ma.is_masked(values):
             number = int(np.flatnonzero(np.ma.getmaskarray(np.ma.asarray(values)))[0]) + 1
             raise InputError(f"{name}[{number}]: masked; expected a number")

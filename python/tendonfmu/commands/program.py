@@ -12,7 +12,6 @@ import mmap
 import os
 import sys
 import warnings
-from collections.abc import Iterator, Mapping
 from importlib import import_module
 from typing import Annotated, Any, NoReturn, TextIO
 
@@ -82,21 +81,6 @@ COMMANDS = {
 MODULES = {"import": "mjcf", "export": "mjcf"}  # of commands that have none of their own name
 
 
-class Lazily(Mapping[str, Any]):
-    """The commands by name; each is imported when it is asked for."""
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(COMMANDS)
-
-    def __len__(self) -> int:
-        return len(COMMANDS)
-
-    def __getitem__(self, name: str) -> Any:
-        if name not in COMMANDS:
-            raise KeyError(name)
-        return _made(name)
-
-
 @functools.cache
 def _made(name: str) -> Any:
     """Import a command and make its command line."""
@@ -113,7 +97,11 @@ class Commands(TyperGroup):
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)
-        self.commands: Any = Lazily()
+        self.commands: Any = dict.fromkeys(COMMANDS)  # whose names are proposed for one in another spelling
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Import a command when it is asked for."""
+        return _made(cmd_name) if cmd_name in COMMANDS else None
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """List the commands without importing them."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -17,7 +18,7 @@ from tendonfmu.commands.console import Result, deliver, progress_bar, say_files
 from tendonfmu.options import RecordingSources, ScoreOptions, keywords
 
 if TYPE_CHECKING:
-    from tendonfmu.detect import Scored, ScoreReport
+    from tendonfmu.detect import Scored
     from tendonfmu.model import FingerSource
 
 
@@ -59,12 +60,12 @@ class ScoreResult(Result):
     @property
     def median_delay(self) -> float:
         """Median time from the onset of an event to its alarm (s); NaN if none was found."""
-        return self.scored.summary.delay["median"].value
+        return self.scored.summary.delay_s.median.number
 
     @property
-    def report(self) -> ScoreReport:
+    def report(self) -> Mapping[str, Any]:
         """All results, as `tendonfmu score -o` writes them."""
-        return detect.score_report.build_report(self.scored)
+        return detect.build_report(self.scored)
 
     @property
     def warnings(self) -> list[str]:
@@ -73,7 +74,7 @@ class ScoreResult(Result):
 
     def shown(self) -> Any:
         """Return what the command prints."""
-        return reporting.detection.score_tables(self.report), reporting.detection.score_lines(self.report), ""
+        return reporting.detection.score_tables(self.scored), reporting.detection.score_lines(self.scored), ""
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write the report, as `tendonfmu score -o`. Raises InputError if it cannot be written."""

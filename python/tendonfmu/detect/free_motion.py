@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tendonfmu.arrays import Array, Data, Flags, Indices, Numbers, flagged_rows
+from tendonfmu.arrays import Array, Flags, Indices, Numbers, flagged_rows
 from tendonfmu.detect.counting import sample_seconds, stretches
 from tendonfmu.errors import InputError
 from tendonfmu.files import counted
@@ -177,9 +177,9 @@ def _moves(finger: Finger, recording: Recording, speed: Numbers) -> Flags:
 # --- runs -------------------------------------------------------------------------------------------------------------
 
 
-def runs_of(data: Data, parts: Sequence[FreePart]) -> Iterator[tuple[FreePart, dict[str, Array]]]:
+def runs_of(described: Finger, parts: Sequence[FreePart]) -> Iterator[tuple[FreePart, dict[str, Array]]]:
     """Run a finger over every part, each from its start."""
-    finger = native.Instance.from_description(data, parts[0].kinematics)
+    finger = described.instance(parts[0].kinematics)
     begin = finger.save_state()
     for part in parts:
         finger.restore_state(begin)
@@ -200,10 +200,10 @@ class Alarms:
     at_start: int  # before `SETTLING`, which do not count
 
 
-def count_alarms(data: Data, parts: Sequence[FreePart]) -> list[Alarms]:
+def count_alarms(finger: Finger, parts: Sequence[FreePart]) -> list[Alarms]:
     """Run the finger over every part from its start. An alarm counts if it begins in counted time."""
     found = []
-    for part, outputs in runs_of(data, parts):
+    for part, outputs in runs_of(finger, parts):
         contact = outputs["contact"].ravel().astype(bool)
         spans = stretches(part.time, contact)
         length = part.time[spans[:, 1]] + part.seconds[spans[:, 1]] - part.time[spans[:, 0]]

@@ -18,7 +18,7 @@ from scipy.stats import genpareto
 
 from tendonfmu.arrays import Array, Data, Flags, Indices, Numbers, rounded
 from tendonfmu.detect.free_motion import FreePart
-from tendonfmu.model import native
+from tendonfmu.model import finger_of, native
 
 # --- terms of a bound -------------------------------------------------------------------------------------------------
 
@@ -69,7 +69,7 @@ def largest(values: Numbers | Signal, first: Indices) -> Indices:
 
 def run_free(data: Data, parts: Sequence[FreePart]) -> tuple[list[Terms], list[dict[str, Array]]]:
     """Run the finger over every part with nothing in contact; return terms, and residual and std [N, n] (N·m)."""
-    finger = native.Instance.from_description(_without_contact(data, parts), parts[0].kinematics)
+    finger = finger_of(_without_contact(data, parts)).instance(parts[0].kinematics)
     start = finger.save_state()
     terms, kept = [], []
     for part in parts:

@@ -1,4 +1,4 @@
-"""The score of a finger, or its FMU, on labelled recordings: runs, decisions, and runs with other thresholds."""
+"""The score of a finger, or its FMU, on labelled recordings: runs, decisions, runs with other thresholds, report."""
 
 from __future__ import annotations
 
@@ -6,26 +6,40 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.arrays import Flags, Numbers
-from tendonfmu.detect.counting import DetectionScore, Signals, pooled, score_detection
+from tendonfmu.detect.counting import GRACE, MERGED, SILENT, DetectionScore, Event, Signals, pooled, score_detection
 from tendonfmu.detect.free_motion import sensed_contact
-from tendonfmu.detect.summary import FACTORS, RocPoint, Summary, roc, summarise
+from tendonfmu.detect.summary import (
+    FACTORS,
+    Definitions,
+    FalseAlarm,
+    Figures,
+    Point,
+    Roc,
+    ScoredEvent,
+    ScoredRecording,
+    ScoreReport,
+    roc,
+    summarise,
+)
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import check_given_once
-from tendonfmu.files import counted
+from tendonfmu.files import counted, finite
 from tendonfmu.fmu import check_model, finger_of, outputs_of, run_fmu
 from tendonfmu.model import Finger, FingerSource, finger_file, inputs_used, native, read_finger, watches_motors
 from tendonfmu.options import ScoreOptions
 from tendonfmu.recordings import GROUP_PER, LABEL, Recording, RecordingSource, gaps, listed_sources, read_recordings
+from tendonfmu.statistics import intervals
 
 Progress = Callable[[int, int], None]
 
 USUAL = ScoreOptions()
+FORMAT: Final = "tendonfmu-score-1"
 BOUNDS = ("contact.threshold", "contact.bands")  # how their paths begin
 
 
@@ -74,9 +88,9 @@ class Scored:
     options: ScoreOptions
     tracks: Sequence[Track]  # by recording
     scores: Sequence[DetectionScore]
-    summaries: Sequence[Summary]
-    summary: Summary  # summary of all recordings together
-    roc: Sequence[RocPoint] | None  # points of the ROC; None for an FMU
+    summaries: Sequence[Figures]
+    summary: Figures  # of all recordings together
+    roc: list[Point] | None  # points of the ROC; None for an FMU
     warnings: Sequence[str]  # sentences
 
     @property
@@ -140,10 +154,10 @@ def score_recordings(
     )
 
 
-def _opposed(summary: Summary, joints: Sequence[str]) -> list[str]:
+def _opposed(summary: Figures, joints: Sequence[str]) -> list[str]:
     """Warn if the estimated torque falls where that of the reference sensor rises."""
-    slopes = [] if summary.contact is None else summary.contact.slope
-    names = [name for name, slope in zip(joints, slopes, strict=False) if slope.high < 0.0]
+    slopes = summary.contact_torque_slope or []
+    names = [name for name, slope in zip(joints, slopes, strict=False) if slope.ends[1] < 0.0]
     if not names:
         return []
     return [
@@ -266,3 +280,63 @@ def _score_scaled(finger: Finger, tracks: Sequence[Track], kinematics: int, fact
     values = scaled_bounds(finger, factor)
     runs = (replace(track, outputs=_run(finger, track.recording, kinematics, values)) for track in tracks)
     return pooled([run.decisions() for run in runs])
+
+
+# --- the report -------------------------------------------------------------------------------------------------------
+
+
+def build_report(scored: Scored) -> dict[str, Any]:
+    """Return the JSON of a `ScoreReport`; numbers that are not finite become None."""
+    labels = LABEL if scored.options.labels is None else scored.options.labels
+    report = ScoreReport(
+        **vars(scored.summary),
+        format=FORMAT,
+        finger=scored.finger.name,
+        model=str(scored.finger.path),
+        joints=scored.finger.joint_names,
+        kinematics=scored.options.kinematics,
+        labels=labels,
+        definitions=Definitions(merged_s=MERGED, silent_s=SILENT, grace_s=GRACE),
+        confidence=intervals.CONFIDENCE,
+        seed=scored.options.seed,
+        warnings=list(scored.warnings),
+        roc=Roc(scored.roc, scored.no_roc),
+        recordings=[_entry(*each) for each in zip(scored.tracks, scored.scores, scored.summaries, strict=True)],
+    )
+    return {"format": FORMAT, **finite(vars(report))}
+
+
+def _entry(track: Track, score: DetectionScore, figures: Figures) -> ScoredRecording:
+    time = track.recording.time
+    return ScoredRecording(
+        **vars(figures),
+        path=str(track.recording.path),
+        samples=len(time),
+        duration_s=float(time[-1] - time[0]),
+        labelled=track.recording.contact is not None,
+        external_torque=track.external is not None,
+        sensed_force=track.force is not None,
+        mean_force=float(np.abs(track.recording.groups["tendon_force"]).mean()),
+        event_list=[_event(event) for event in score.events],
+        false_alarm_list=[FalseAlarm(*alarm) for alarm in score.false_alarms],
+    )
+
+
+def _event(event: Event) -> ScoredEvent:
+    return ScoredEvent(
+        onset_s=event.onset,
+        end_s=event.end,
+        found=event.found,
+        silent_before=event.silent,
+        alarm_s=event.alarm,
+        delay_s=event.delay,
+        at_release=event.found and event.released,
+        largest_torque=event.largest,
+        joint=None if event.joint is None else event.joint + 1,
+        held=event.held,
+        held_share=event.held_share,
+        overhang_s=event.overhang,
+        force=event.force,
+        external_torque=None if event.external is None else event.external.tolist(),
+        compensated_torque=None if event.compensated is None else event.compensated.tolist(),
+    )

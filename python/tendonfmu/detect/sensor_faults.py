@@ -15,7 +15,7 @@ import numpy as np
 
 from tendonfmu.arrays import Data, Flags, Numbers
 from tendonfmu.detect.free_motion import FreePart, runs_of
-from tendonfmu.model import DEFAULTS
+from tendonfmu.model import DEFAULTS, finger_of
 from tendonfmu.options import KinematicsSource
 
 # s, and a number of samples for slow rates. Shorter than the default of sensor_fault.hold_time: the check on free
@@ -82,7 +82,7 @@ def learn_sensors(data: Data, parts: Sequence[FreePart]) -> SensorRule:
 
 def finds_a_fault(data: Data, parts: Sequence[FreePart], keys: Mapping[str, float]) -> bool:
     """Tell whether the finger with these keys finds a fault in counted time."""
-    runs = runs_of({**data, "sensor_fault": dict(keys)}, parts)
+    runs = runs_of(finger_of({**data, "sensor_fault": dict(keys)}), parts)
     return any(outputs["sensor_fault"][part.counted].any() for part, outputs in runs)
 
 

@@ -1,4 +1,4 @@
-"""Tunes contact detection on free motion for a stated rate of false alarms, with an interface like scikit-learn's.
+"""Tunes contact detection on free motion for a stated rate of false alarms, in the manner of scikit-learn.
 
 Examples
 --------
@@ -12,7 +12,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize
@@ -46,8 +46,8 @@ from tendonfmu.detect.sensor_faults import SensorRule, learn_sensors
 from tendonfmu.errors import InputError
 from tendonfmu.estimate import check_given_once
 from tendonfmu.files import are, counted
-from tendonfmu.model import Finger, read_finger
-from tendonfmu.options import Configured, Options, TuneOptions
+from tendonfmu.model import Finger, FingerSource, moment_arms, read_finger
+from tendonfmu.options import TuneOptions
 from tendonfmu.recordings import RecordingSource, admit, listed_sources, read_recordings
 
 # --- pushes that are found --------------------------------------------------------------------------------------------
@@ -64,7 +64,7 @@ LONGEST = 1200.0  # s of motion, for each joint
 SLOPES = (0.5, 20.0)  # of the log odds over the log of the size
 
 
-def push_sizes(data: Data, parts: Sequence[FreePart], rms: Numbers) -> Numbers:
+def push_sizes(finger: Finger, parts: Sequence[FreePart], rms: Numbers) -> Numbers:
     """Return by joint [n] the torque of which `SURE` are found within `WITHIN`; NaN if that is beyond `SIZES` (N·m)."""
     seconds = sum(float(part.seconds.sum()) for part in parts)
     used = [part.cut(np.arange(int(len(part.time) * min(1.0, LONGEST / seconds)))) for part in parts]
@@ -73,10 +73,10 @@ def push_sizes(data: Data, parts: Sequence[FreePart], rms: Numbers) -> Numbers:
     for j, left in enumerate(rms):
         random = np.random.default_rng(j)
         pushes = [_pushes(part, left, random) for part in used]
-        loaded = [pushed_part(data, part, j, *each) for part, each in zip(used, pushes, strict=True)]
+        loaded = [pushed_part(finger.data, part, j, *each) for part, each in zip(used, pushes, strict=True)]
         found = [
             _found(part.time, outputs["contact"].ravel().astype(bool), onset)
-            for (part, outputs), (onset, _) in zip(runs_of(data, loaded), pushes, strict=True)
+            for (part, outputs), (onset, _) in zip(runs_of(finger, loaded), pushes, strict=True)
         ]
         sizes[j] = size_found(np.abs(np.concatenate([size for _, size in pushes])), np.concatenate(found))
     return np.where(sizes <= SIZES[1] * rms, sizes, np.nan)
@@ -115,7 +115,7 @@ def pushed_part(data: Data, part: FreePart, joint: int, onset: Numbers, size: Nu
         rows = slice(*np.searchsorted(time, [at, at + HELD]))
         since = np.minimum(time[rows] - at, at + HELD - time[rows])
         torque[rows] = own * np.clip(since / RISE, 0.0, 1.0)
-    arms = np.array([tendon["moment_arms"] for tendon in data["tendons"]], dtype=float)
+    arms = moment_arms(data)
     stiffness = np.array([tendon["stiffness"] for tendon in data["tendons"]], dtype=float)
     turned = -np.linalg.pinv(arms.T * stiffness @ arms)[joint]
     arrays = dict(part.arrays)
@@ -175,7 +175,7 @@ class KeptOut:
         return sum(part.seconds for part in self.parts) / self.seconds
 
 
-class ContactTuning(Configured):
+class ContactTuning:
     """Tunes contact detection from recordings of free motion.
 
     Parameters
@@ -203,8 +203,8 @@ class ContactTuning(Configured):
         Sentences, each also raised as a TuneWarning, and the time of the computation (s).
     """
 
-    Options: ClassVar[type[Options]] = TuneOptions
-    options: TuneOptions
+    def __init__(self, finger: FingerSource, **options: Any) -> None:
+        self.finger, self.options = finger, TuneOptions(**options)
 
     def tune(self, recordings: RecordingSource | Sequence[RecordingSource], *, checked: bool = False) -> ContactTuning:
         """Tune on recordings of free motion.
@@ -241,9 +241,9 @@ class ContactTuning(Configured):
         if self.sensors_.keys is not None:
             self._data["sensor_fault"] = dict(self.sensors_.keys)
         rule = self._learn_rule(terms)
-        self.description_ = self._start.with_data(self._with(rule, learned=True))
+        self.description_ = self._with(rule, learned=True)
         left = np.sqrt(np.mean(self.residuals_.residual**2, axis=0))
-        self.push_: Numbers = push_sizes(self.description_.data, parts, left)
+        self.push_: Numbers = push_sizes(self.description_, parts, left)
         self.seconds_ = perf_counter() - begin
         self._judge()
         for sentence in self.warnings_:
@@ -308,8 +308,8 @@ class ContactTuning(Configured):
         levels = levels_of(seconds_of(terms, weights), self.options.false_alarms_per_hour)
         return (numbers_of(weights, levels),)
 
-    def _with(self, rule: Rule, factor: float = 1.0, learned: bool = False) -> dict[str, Any]:
-        """Return the description that decides by a rule; with everything that was learned, if wanted."""
+    def _with(self, rule: Rule, factor: float = 1.0, learned: bool = False) -> Finger:
+        """Return the finger that decides by a rule; with everything that was learned, if wanted."""
         given = self._start.data["contact"]
         contact = {key: given[key] for key in ("threshold", "threshold_per_force") if given.get(key) is not None}
         contact["method"] = self.options.method
@@ -320,11 +320,11 @@ class ContactTuning(Configured):
         if learned:
             contact["deviation"] = rounded(self.deviation_.base, _DIGITS)
             contact["deviation_per_force"] = rounded(self.deviation_.per_force, _DIGITS)
-        return {**self._data, "contact": contact}
+        return self._start.with_data({**self._data, "contact": contact})
 
     def _show(self, done: int, steps: int) -> None:
-        if self.progress is not None:
-            self.progress(done, steps)
+        if self.options.progress is not None:
+            self.options.progress(done, steps)
 
     # --- what is said -------------------------------------------------------------------------------------------------
 

@@ -21,7 +21,7 @@ from tendonfmu.diagnosis.extension_fit import structure_of
 from tendonfmu.diagnosis.samples import Samples, Span, span_of, with_late_forces
 from tendonfmu.errors import TooLargeError
 from tendonfmu.estimate import SCALING, Estimator
-from tendonfmu.model import law_path, native, own_copy, set_number, steps_of
+from tendonfmu.model import law_path, own_copy, set_number, steps_of
 
 Single = NDArray[np.float32]
 Worth = Callable[[Mechanism, Place, Mapping[str, float]], bool]
@@ -260,8 +260,7 @@ def numbers_of(data: Data) -> list[Number]:
 def estimator_of(data: Data) -> tuple[Estimator, list[str]]:
     """Return an estimator of all numbers that a fit estimates, and the paths of the description's parameters."""
     structure = structure_of(data)
-    paths = [parameter.path for parameter in native.Instance(structure.start.image).parameters()]
-    return Estimator(structure.start.image, structure.group, structure.scale), paths
+    return Estimator(structure.start.image, structure.group, structure.scale), list(structure.index)
 
 
 def _owner(data: Data, path: str) -> tuple[str, Place, int]:

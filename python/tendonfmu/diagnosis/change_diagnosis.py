@@ -43,7 +43,7 @@ from tendonfmu.diagnosis.result import (
 )
 from tendonfmu.diagnosis.samples import Samples
 from tendonfmu.diagnosis.selection import SIGNIFICANCE, Judged, confirmed, invisible_effects, names_needed
-from tendonfmu.model import native
+from tendonfmu.model import finger_of
 from tendonfmu.statistics import Interval
 
 LEAST_UNKNOWN = 0.25  # of the rms: recordings of an unchanged finger differ by this much
@@ -302,7 +302,7 @@ def sized(search: ChangeSearch, number: int) -> dict[str, Any]:
     """Return the size of one of the changes, as fields of `Cause`, estimated together with all others."""
     changes = search.causes
     now = search.now_data()
-    units = {parameter.path: parameter.unit for parameter in native.Instance.from_description(now).parameters()}
+    units = {path: number.unit for path, number in finger_of(now).numbers.items()}
     if changes[number].terms:
         return _new_term(search, number, now, units)
     then = search.now_data([change for k, change in enumerate(changes) if k != number])

@@ -38,7 +38,7 @@ from tendonfmu.diagnosis.remainder_learner import Learner
 from tendonfmu.diagnosis.result import DetectionGain, Event
 from tendonfmu.diagnosis.samples import Samples, Series
 from tendonfmu.errors import InputError
-from tendonfmu.model import Finger, finger_from_data
+from tendonfmu.model import Finger, finger_of
 from tendonfmu.recordings import FitRecording, Recording
 from tendonfmu.statistics import Folds, Interval, Splines, blocks_of, intervals, make_folds
 
@@ -277,9 +277,10 @@ def event_gain(data: Mapping[str, Any], recordings: Sequence[FitRecording], even
     """Return the share of the rms that leaving the events out removes, with a 95 % interval; None without events."""
     if not events:
         return None
+    finger = finger_of(data)
     within, samples, parts = 0.0, 0, []  # Σ r² in the events and their samples; both of the blocks outside [B, 2]
     for recording in recordings:
-        squares = np.sum(recording.run(data).residual ** 2, axis=1)
+        squares = np.sum(recording.run(finger).residual ** 2, axis=1)
         judged = recording.train & np.isfinite(squares)
         inside = _inside(events, str(recording.path), recording.time)
         within += float(squares[judged & inside].sum())
@@ -316,7 +317,7 @@ def detection_gain(nominal: Data, extended: Data, recordings: Sequence[FitRecord
     every = [recording.recording for recording in recordings]
     labelled = [recording for recording in every if recording.contact is not None and recording.contact.any()]
     kinematics = recordings[0].kinematics
-    free = _free_motion(finger_from_data(nominal), every, kinematics) if labelled else []
+    free = _free_motion(finger_of(nominal), every, kinematics) if labelled else []
     hours = sum(float(recording.time[-1] - recording.time[0]) - SETTLING for recording in free) / 3600
     if not hours > 0:
         return None
@@ -324,8 +325,9 @@ def detection_gain(nominal: Data, extended: Data, recordings: Sequence[FitRecord
         tuned = [_tuned(data, free, kinematics, min(max(RATE, 1.0 / hours), HIGHEST)) for data in (nominal, extended)]
     except InputError:  # nothing can be tuned, for example with a bias without drift
         return None
-    fingers = [finger_from_data(tuning.description_.data) for tuning in tuned]
-    before, after = (pooled([run_track(one, each, kinematics).score() for each in labelled]) for one in fingers)
+    before, after = (
+        pooled([run_track(tuning.description_, each, kinematics).score() for each in labelled]) for tuning in tuned
+    )
     delays = [float(np.median(score.delays)) if len(score.delays) else None for score in (before, after)]
     return DetectionGain(
         events=len(before.events),
@@ -378,7 +380,7 @@ def _pieces(recording: Recording, contact: Flags) -> list[Recording]:
 
 
 def _tuned(data: Data, free: Sequence[Recording], kinematics: int, rate: float) -> ContactTuning:
-    tuning = ContactTuning(finger_from_data(data), false_alarms_per_hour=rate, kinematics=kinematics)
+    tuning = ContactTuning(finger_of(data), false_alarms_per_hour=rate, kinematics=kinematics)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", TuneWarning)
         return tuning.tune(list(free), checked=True)

@@ -28,17 +28,17 @@ from tendonfmu.estimate import (
     build_structure,
     guess_prior,
     minimise,
-    unknowns,
     with_known_numbers,
     with_values,
 )
 from tendonfmu.model import (
+    Finger,
     effects,
     extension_rows,
-    finger_from_data,
+    finger_of,
+    friction_numbers,
     get_number,
     law_path,
-    native,
     own_copy,
     set_number,
 )
@@ -164,7 +164,7 @@ def fit_numbers(
     """
     # The samples have the forces that the model predicts: they lack the noise, which a term that scales with the force
     # would otherwise fit by shrinking the force.
-    if not unknowns(data):
+    if not friction_numbers(data):
         return FittedModel(data=data, given=data, values={})
     origin = data if given is None else given
     structure = _structure(data, origin, fixed, settings)
@@ -188,7 +188,7 @@ def fit_numbers(
 def _problem(structure: Structure, samples: Samples) -> MemoryProblem:
     """Return a fit of a structure, whose blocks are worth fewer independent ones."""
     estimator = Estimator(structure.start.image, structure.group, structure.scale)
-    problem = MemoryProblem(structure, estimator, samples.runs.of(structure.start.data), samples.drift)
+    problem = MemoryProblem(structure, estimator, samples.runs.of(structure.start), samples.drift)
     problem.blocks = problem.blocks * (samples.grid.step / LASTING / MEMORY)
     problem.mean, problem.known = guess_prior(problem)
     return problem
@@ -197,7 +197,7 @@ def _problem(structure: Structure, samples: Samples) -> MemoryProblem:
 def _structure(data: Data, given: Data, fixed: tuple[str, ...], settings: FitSettings) -> Structure:
     """Return what is fitted of a description; `given` says how large each number may be."""
     choice = replace(settings.choice, fix=(*settings.choice.fix, *fixed))
-    return _with_scale(build_structure(finger_from_data(data, settings.path), choice), given)
+    return _with_scale(build_structure(Finger(settings.path, data), choice), given)
 
 
 def intervals_of(model: FittedModel, samples: Samples, settings: FitSettings) -> dict[str, Interval]:
@@ -225,7 +225,7 @@ def intervals_of(model: FittedModel, samples: Samples, settings: FitSettings) ->
 
 def number_columns(data: Data, samples: Samples) -> tuple[Array, Numbers]:
     """Return the derivatives of a torque by the numbers that a fit estimates [B, n, u], and the scale of these [u]."""
-    if not unknowns(data):
+    if not friction_numbers(data):
         return np.zeros((samples.grid.blocks, len(data["joints"]), 0)), np.zeros(0)
     problem = _problem(structure_of(data), samples)
     chosen = [k for k, unknown in enumerate(problem.estimator.unknowns) if not unknown.path.startswith("bias.")]
@@ -234,7 +234,7 @@ def number_columns(data: Data, samples: Samples) -> tuple[Array, Numbers]:
 
 def structure_of(data: Data) -> Structure:
     """Return the numbers of a description that a fit estimates, with their expected magnitudes."""
-    return _with_scale(build_structure(finger_from_data(data, Path("finger")), Choice()), data)
+    return _with_scale(build_structure(finger_of(data), Choice()), data)
 
 
 def key_of(data: Data, path: str) -> Any:
@@ -248,7 +248,7 @@ def key_of(data: Data, path: str) -> Any:
 
 def with_known(data: Mapping[str, Any], recordings: Sequence[FitRecording], settings: FitSettings) -> Mapping[str, Any]:
     """Return a fitted description with what recordings tell of its numbers (`estimated`)."""
-    return with_known_numbers(finger_from_data(data, settings.path), recordings).data
+    return with_known_numbers(Finger(settings.path, data), recordings).data
 
 
 def fit_extended(
@@ -265,7 +265,7 @@ def fit_extended(
         return nominal
     data = extended_description(nominal.data, causes)
     added = zip(causes, added_paths(nominal.data, causes), strict=True)
-    estimated = {number.path for number in unknowns(data)}
+    estimated = {number.path for number in friction_numbers(data)}
     fixed = tuple(path for cause, paths in added if cause.fixed for path in paths if path in estimated)
     fixed = (*nominal.fixed, *fixed)
     if begin is not None:
@@ -276,17 +276,12 @@ def fit_extended(
 def carried(data: Data, known: Data) -> Mapping[str, Any]:
     """Return a description with the numbers that another one has, too."""
     # a number that goes with another one there may be free here: `static` of a law that had no drop
-    theirs = {
-        key_of(known, path): path
-        for number in unknowns(known)
-        for path in (number.path, number.with_path)
-        if path is not None
-    }
+    theirs = {key_of(known, path): path for number in friction_numbers(known) for path in number.paths}
     result = own_copy(data)
-    for number in unknowns(data):
+    for number in friction_numbers(data):
         path = theirs.get(key_of(data, number.path))
-        for own in (number.path, number.with_path):
-            if own is not None and path is not None:
+        for own in number.paths:
+            if path is not None:
                 set_number(result, own, float(get_number(known, path)))
     for effect in effects(result):  # a drop that only this one has stays above what came of the other
         for side in sides_at(result, effect.path):
@@ -298,7 +293,7 @@ def cause_parameters(
     nominal: Mapping[str, Any], causes: Sequence[Term], model: FittedModel
 ) -> tuple[Mapping[str, tuple[float, str]], ...]:
     """Return the numbers of each cause in a model that was fitted with all of them: path -> (value, unit)."""
-    units = {parameter.path: parameter.unit for parameter in native.Instance.from_description(model.data).parameters()}
+    units = {path: number.unit for path, number in finger_of(model.data).numbers.items()}
     # those that were estimated, and all numbers of extensions
     known = {*model.values, *(path for path in units if path.startswith("extensions["))}
     return tuple(
@@ -360,8 +355,8 @@ def _with_scale(structure: Structure, given: Mapping[str, Any]) -> Structure:
     """Set the expected magnitudes of the numbers."""
     scale = structure.scale.copy()
     for number in structure.numbers:
-        for path in (number.path, number.with_path):
-            if path is None or not np.isnan(scale[structure.index[path]]):
+        for path in number.paths:
+            if not np.isnan(scale[structure.index[path]]):
                 continue
             for known in _coarser(path):
                 value = _number_or_none(given, known)

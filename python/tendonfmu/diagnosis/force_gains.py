@@ -6,7 +6,6 @@ and so does a true force that is larger than the measured one. Only the latter s
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
@@ -20,7 +19,7 @@ from tendonfmu.diagnosis.kinematic_causes import KinematicCauses, find_kinematic
 from tendonfmu.diagnosis.result import Cause, CausePlace, Diagnosis
 from tendonfmu.diagnosis.selection import CERTAIN, rms_gain
 from tendonfmu.diagnosis.tendon_equation import SPRING, Off
-from tendonfmu.model import extended_row, finger_from_data
+from tendonfmu.model import extended_row, extension_rows
 
 GAIN = by_name("force_gain")
 OF_GAIN = (GAIN.name, CALIBRATION)
@@ -109,12 +108,10 @@ def _gain_of(given: Input, off: Off, others: Mapping[int, float], least_gain: fl
 
 def _softened(given: Input, gains: Mapping[int, float]) -> Input:
     """Return the input with the springs that tendons seem to have, where each force is measured too small by a gain."""
-    if not gains:
-        return given
-    data = copy.deepcopy(given.finger.data)
+    finger, values = given.finger, dict[str, float]()
     for tendon, gain in gains.items():
-        data["tendons"][tendon - 1]["stiffness"] /= 1.0 + gain
-        for row in data.get("extensions") or []:
-            if row["effect"] == SPRING and row["tendon"] == tendon:
-                row["hardening"] /= 1.0 + gain
-    return given.of_finger(finger_from_data(data, given.finger.path))
+        values[f"tendons[{tendon}].stiffness"] = finger.data["tendons"][tendon - 1]["stiffness"] / (1.0 + gain)
+        for k, row in enumerate(extension_rows(finger.data), start=1):
+            if (row["effect"], row.get("tendon")) == (SPRING, tendon):
+                values[f"extensions[{k}].hardening"] = row["hardening"] / (1.0 + gain)
+    return given.of_finger(finger.replace(values)) if gains else given

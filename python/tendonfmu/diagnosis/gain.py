@@ -17,7 +17,7 @@ from tendonfmu.arrays import Data, Flags, Numbers
 from tendonfmu.diagnosis.result import ModelErrors
 from tendonfmu.diagnosis.samples import Samples, as_described
 from tendonfmu.errors import InputError
-from tendonfmu.model import without_friction
+from tendonfmu.model import finger_of, without_friction
 from tendonfmu.recordings import FitRecording, rms
 from tendonfmu.statistics import BlockIndex, Interval, blocks_of, gain_interval, variance_between
 
@@ -138,8 +138,9 @@ class Unseen(_Judged):
 
 def _delivered(data: Data, training: Sequence[FitRecording], tests: Sequence[FitRecording]) -> ModelErrors:
     """Return the rms of r, which the FMU leaves before it moves its bias, per joint."""
-    trained = [recording.run(data).residual for recording in training]
-    tested = [recording.run(data).residual for recording in tests] if tests else trained
+    finger = finger_of(data)
+    trained = [recording.run(finger).residual for recording in training]
+    tested = [recording.run(finger).residual for recording in tests] if tests else trained
     unseen = [recording.tracked if tests else recording.held_out for recording in tests or training]
     flags = np.concatenate([recording.train for recording in training])
     return ModelErrors(

@@ -36,7 +36,7 @@ from tendonfmu.diagnosis.tendon_equation import (
     offset_of,
     rows_of,
 )
-from tendonfmu.model import finger_from_data, moment_arms
+from tendonfmu.model import moment_arms
 from tendonfmu.recordings import Learned, TendonRouting, learn_routing, varying_sentences
 from tendonfmu.statistics import Interval
 
@@ -100,7 +100,7 @@ class KinematicCauses:
             return given
         finger, moved = given.finger, self.off
         if not self.is_change:
-            finger = finger_from_data(self.edited(finger.data), finger.path)
+            finger = finger.with_data(self.edited(finger.data))
             moved = tuple(off for off in moved if off.where.effect == ENCODER)
         before = Geometry.of(finger.data)
         now = before.moved(moved)

@@ -17,7 +17,7 @@ from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.menu import Entry, Section, entry_from_json, own_tension
 from tendonfmu.errors import InputError
 from tendonfmu.excite import Excitation, Plan, plan_excitation
-from tendonfmu.model import balanced_forces, moment_arms, tendon_positions
+from tendonfmu.model import balanced_forces, finger_of, moment_arms, tendon_positions
 from tendonfmu.recordings import FitRecording, Recording, run_parts
 from tendonfmu.statistics import quintic
 
@@ -49,7 +49,7 @@ def expected_recording(data: Data, performed: Excitation, kinematics: int) -> Fi
         "joint_position": performed.joint_position,
         "joint_velocity": performed.joint_velocity,
     }
-    force = balanced_forces(data, motion, performed.tension + performed.load @ spread)
+    force = balanced_forces(finger_of(data), motion, performed.tension + performed.load @ spread)
     groups = {
         "tendon_force": force,
         "tendon_position": tendon_positions(data, performed.joint_position, force),
@@ -70,7 +70,7 @@ def expected_recording(data: Data, performed: Excitation, kinematics: int) -> Fi
         faulty=none,
         silent=np.zeros((samples, len(data["joints"])), dtype=bool),
         parts=whole,
-        model=run_parts(data, recording.arrays(), whole, ~none, kinematics),
+        model=run_parts(finger_of(data), recording.arrays(), whole, ~none, kinematics),
         warnings=[],
     )
 

@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.arrays import Array, Data, Flags, Numbers
-from tendonfmu.estimate import CoreRuns, SlowDrift, image_that_holds, slowest_drift
-from tendonfmu.model import extension_rows, moment_arms, native, number_of, without_learning
+from tendonfmu.estimate import CoreRuns, SlowDrift, slowest_drift
+from tendonfmu.model import extension_rows, finger_of, moment_arms, number_of
 from tendonfmu.recordings import FitRecording, Grid, Segment, delayed_torque
 from tendonfmu.statistics import BlockSeries, Splines
 
@@ -43,10 +43,10 @@ class Series(BlockSeries):
 
 def exact_model(data: Mapping[str, Any], recording: FitRecording, *, jumps: bool = True) -> Numbers:
     """Return G of a description from a run of the core, N·m [N, n]; NaN outside of the parts."""
-    image, residual = image_that_holds(without_learning(data)), np.full(recording.target.shape, np.nan)
+    steady, residual = finger_of(data).steady, np.full(recording.target.shape, np.nan)
     for part in recording.parts:
         arrays = recording.arrays(part)
-        outputs = native.Instance(image, kinematics_source=recording.kinematics).run(arrays)
+        outputs = steady.instance(recording.kinematics).run(arrays)
         residual[part] = outputs["friction_torque"] - delayed_torque(data, arrays, outputs["joint_torque"])
         if not jumps:
             residual[part] -= outputs["bias_torque"]
@@ -121,7 +121,7 @@ class Samples:
     @classmethod
     def of(cls, data: Data, recordings: Sequence[FitRecording], threads: int = 1) -> Samples:
         """Prepare recordings as they were measured."""
-        runs = CoreRuns(data, recordings, rate=RATE, threads=threads)
+        runs = CoreRuns(finger_of(data), recordings, rate=RATE, threads=threads)
         return cls(recordings, runs, SlowDrift(runs.time, runs.stretch, runs.used), threads)
 
     @property
@@ -150,7 +150,7 @@ class Samples:
 
     def left(self, data: Data, values: Mapping[str, float] | None = None) -> Numbers:
         """Return the torque that a description leaves, with some other numbers by path, N·m [B, n]."""
-        return self.runs.of(data).residual(values)
+        return self.runs.of(finger_of(data)).residual(values)
 
     def residual(self, data: Data) -> Numbers:
         """Return the same without its drift [B, n], N·m; 0 at blocks that are not used."""
@@ -165,7 +165,7 @@ class Samples:
 
     def of_recordings(self, data: Data, recordings: Sequence[FitRecording]) -> Samples:
         """Return the samples with the forces of other recordings of the same times; the measured torque stays."""
-        runs = CoreRuns(data, recordings, self.grid, rate=RATE, threads=self.threads)
+        runs = CoreRuns(finger_of(data), recordings, self.grid, rate=RATE, threads=self.threads)
         runs.added = self.runs.added
         return replace(self, recordings=recordings, runs=runs)
 

@@ -50,7 +50,7 @@ from tendonfmu.diagnosis.selection import (
 )
 from tendonfmu.diagnosis.view import View
 from tendonfmu.estimate import SCALING
-from tendonfmu.model import finger_from_data, moment_arms
+from tendonfmu.model import Finger, moment_arms
 from tendonfmu.statistics import Interval
 from tendonfmu.tasks import Phases, Step
 
@@ -312,7 +312,7 @@ class ExtensionSearch(CauseSearch):
         base = self.base
         if gain < LARGE or not memory_of(model.data):
             return model
-        described = finger_from_data(model.data, base.settings.path)
+        described = Finger(base.settings.path, model.data)
         other, memory = remembering(described, base.nominal, base.samples, base.settings, base.model.fixed)
         if base.left_unseen(other).sum() >= base.left_unseen(model).sum():
             return model

@@ -10,7 +10,7 @@ from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from . import identifiability, verdicts
-    from .core_runs import CoreRuns, SlowDrift, image_that_holds, slowest_drift
+    from .core_runs import CoreRuns, SlowDrift, slowest_drift
     from .estimation import ESTIMATION_MISSING, HAS_ESTIMATION, EstimationError, Estimator, Unknown
     from .files import (
         FIT_REPORT,
@@ -21,9 +21,21 @@ if TYPE_CHECKING:
         read_previous_fit,
         with_previous_values,
     )
-    from .fisher_information import Noise, Progress, information, noise_of, sensitivities, unknowns
-    from .fit_report import FitPicture, FitSeries, LawBands, LawCurve, asymmetric, evaluate, numbers_of, unseen_square
-    from .fit_types import Comparison, FitReport, FittedNumber, ResidualRms
+    from .fisher_information import Noise, Progress, information, noise_of, sensitivities
+    from .fit_report import (
+        Comparison,
+        FitPicture,
+        FitReport,
+        FitSeries,
+        FittedNumber,
+        LawBands,
+        LawCurve,
+        ResidualRms,
+        asymmetric,
+        evaluate,
+        numbers_of,
+        unseen_square,
+    )
     from .fitting import FitWarning, FrictionFit
     from .identifiability import EffectCoverage, Judgement, Verdict, counts_by_kind, coverage_of, durations, judge
     from .learning import (
@@ -42,7 +54,6 @@ if TYPE_CHECKING:
     from .memory_methods import guess_prior
     from .methods import learn_batch
     from .structure import (
-        MAGNITUDES,
         SCALING,
         Choice,
         Structure,

@@ -7,19 +7,18 @@ between runs, so they know every term of the core. Both are block means over the
 
 from __future__ import annotations
 
-import json
 import os
-from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from copy import copy
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from scipy import sparse
 
-from tendonfmu.arrays import Array, Data, Flags, Indices, Numbers
-from tendonfmu.model import INPUTS_OF_SOURCE, native, number_of, without_learning
+from tendonfmu.arrays import Array, Flags, Indices, Numbers
+from tendonfmu.model import INPUTS_OF_SOURCE, Finger, number_of
 from tendonfmu.recordings import FitRecording, Grid, Segment, make_grid
 from tendonfmu.statistics import Span, spline_basis
 
@@ -43,7 +42,7 @@ class CoreRuns:
 
     def __init__(
         self,
-        data: Data,
+        finger: Finger,
         recordings: Sequence[FitRecording],
         grid: Grid | None = None,
         *,
@@ -51,7 +50,7 @@ class CoreRuns:
         threads: int = 0,
     ) -> None:
         """Thin the recordings to about `rate` (Hz; inf: all samples). `threads` 0: all cores."""
-        self.data, self._image, self._rate, self._threads = data, _image(data), rate, threads
+        self._settle(finger)
         self.grid = make_grid(recordings) if grid is None else grid
         segments = self.grid.segments
         self.stretches = [_stretch(recordings[segment.recording], segment, rate) for segment in segments]
@@ -64,28 +63,32 @@ class CoreRuns:
         fastest = self.grid.means([np.abs(recording.model.joint_speed) for recording in recordings])
         self.torque: Numbers = self.grid.means([recording.target for recording in recordings])
         counts = self.used | (self.grid.means([recording.at_rest for recording in recordings]) == 1.0)
-        self.still: Flags = counts & np.all(fastest <= number_of(data, "velocity_threshold.joint"), axis=1)
+        self.still: Flags = counts & np.all(fastest <= number_of(finger.data, "velocity_threshold.joint"), axis=1)
         silent = self.grid.means([recording.silent for recording in recordings]) > 0.0
         # joints that say something; what all leave while they rest shows a drift
         self.loud: Flags = ~silent | silent.all(axis=1, keepdims=True)
         self.added: Numbers | float = 0.0  # torque that is measured beyond that of the runs' forces, N·m [B, n]
         self._pool = ThreadPoolExecutor(threads or os.cpu_count() or 1)
-        self._instances = _Instances()
+
+    def _settle(self, finger: Finger) -> None:
+        self.finger = finger
+        self._idle = [finger.steady.instance()]  # each used by one thread at a time
+        self._start = self._idle[0].save_state()
 
     @property
     def joints(self) -> int:
         """Number of joints n."""
-        return len(self.data["joints"])
+        return self.finger.joints
 
-    def of(self, data: Data) -> CoreRuns:
+    def of(self, finger: Finger) -> CoreRuns:
         """Return runs of another description of the same finger over the same samples."""
-        other = object.__new__(CoreRuns)
-        other.__dict__ = {**self.__dict__, "data": data, "_image": _image(data), "_instances": _Instances()}
+        other = copy(self)
+        other._settle(finger)
         return other
 
     def residual(self, values: Mapping[str, float] | None = None) -> Numbers:
         """Return block means of τ − T, [B, n] (N·m). `values`: numbers that differ, by path, SI units."""
-        parts = self._pool.map(lambda each: self._left(self._image, values or {}, each), self.stretches)
+        parts = self._pool.map(lambda each: self._left(values or {}, each), self.stretches)
         return np.asarray(self.loud * (np.concatenate(list(parts)) + self.added))
 
     def columns(
@@ -100,48 +103,24 @@ class CoreRuns:
 
         def fill(k: int) -> None:
             moved, length = moves[k]
-            left = np.concatenate([self._left(self._image, {**at, **moved}, each) for each in self.stretches])
+            left = np.concatenate([self._left({**at, **moved}, each) for each in self.stretches])
             columns[:, :, k] = (self.loud * (left + self.added) - base) / length
 
         list(self._pool.map(fill, range(len(moves))))
         return columns
 
-    def _left(self, image: bytes, values: Mapping[str, float], stretch: Stretch) -> Numbers:
+    def _left(self, values: Mapping[str, float], stretch: Stretch) -> Numbers:
         """Return [count, n] block means of τ − T (N·m) of one stretch."""
-        finger = self._instances.take(image)
-        finger.reset()
+        try:
+            finger = self._idle.pop()  # one step for the interpreter: no other thread gets the same
+        except IndexError:
+            finger = self.finger.steady.instance()
+        finger.restore_state(self._start)
         finger.set_kinematics_source(stretch.kinematics)
         finger.set(values)
         left = finger.run(stretch.arrays)["compensated_torque"]
-        self._instances.give(image, finger)
+        self._idle.append(finger)
         return np.asarray(left.reshape(stretch.segment.count, -1, left.shape[1]).mean(axis=1) - stretch.external)
-
-
-class _Instances:
-    """Fingers by image, each used by one thread at a time."""
-
-    def __init__(self) -> None:
-        self._idle: dict[bytes, list[native.Instance]] = defaultdict(list)
-
-    def take(self, image: bytes) -> native.Instance:
-        try:
-            return self._idle[image].pop()  # one step for the interpreter: no other thread gets the same
-        except IndexError:
-            return native.Instance(image)
-
-    def give(self, image: bytes, finger: native.Instance) -> None:
-        self._idle[image].append(finger)
-
-
-def image_that_holds(data: Data) -> bytes:
-    """Return the image of a description whose friction at rest is held, however long."""
-    bias = {**(data.get("bias") or {}), "forget_rate": 0.0, "forgetting": "time"}
-    return native.image_from_json(json.dumps({**data, "bias": bias}))
-
-
-def _image(data: Data) -> bytes:
-    """Return the image of a description whose bias neither learns nor forgets, without contact detection."""
-    return image_that_holds(without_learning(data))
 
 
 def _stretch(recording: FitRecording, segment: Segment, rate: float) -> Stretch:

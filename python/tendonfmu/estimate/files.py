@@ -13,11 +13,9 @@ import numpy as np
 
 from tendonfmu.arrays import Data, Numbers
 from tendonfmu.errors import InputError
-from tendonfmu.estimate.fisher_information import Unknown
 from tendonfmu.estimate.identifiability import LIMIT
-from tendonfmu.estimate.structure import MAGNITUDES, estimable_numbers
 from tendonfmu.files import check_output, check_output_folder, read_json
-from tendonfmu.model import Finger, own_copy, read_finger, set_number
+from tendonfmu.model import LAW_NUMBERS, Finger, Number, estimable_numbers, read_finger
 from tendonfmu.recordings import Recording
 
 FIT_REPORT: Final = "tendonfmu-fit-1"
@@ -145,12 +143,7 @@ def with_previous_values(finger: Finger, previous: PreviousFit) -> Finger:
             f"{previous.path}: none of its {len(previous.values)} numbers is one of {finger.path}; expected the report "
             "or the description of an earlier fit of the same finger"
         )
-    data = own_copy(finger.data)
-    for number in numbers:
-        for path in (number.path, number.with_path):
-            if path is not None:
-                set_number(data, path, previous.values[number.path])
-    return finger.with_data(data)
+    return finger.replace({path: previous.values[number.path] for number in numbers for path in number.paths})
 
 
 # --- `estimated` in a description -------------------------------------------------------------------------------------
@@ -162,7 +155,7 @@ def with_previous_values(finger: Finger, previous: PreviousFit) -> Finger:
 DIGITS = 4  # of a standard error
 
 
-def with_estimates(finger: Finger, numbers: Sequence[Unknown], covariance: Numbers, size: Numbers) -> Finger:
+def with_estimates(finger: Finger, numbers: Sequence[Number], covariance: Numbers, size: Numbers) -> Finger:
     """Return the finger with an entry for all that is known within `LIMIT` of its size [p]."""
     value = np.array([number.value for number in numbers])
     weights = {number.path: np.eye(len(numbers))[k] for k, number in enumerate(numbers)} | _coulomb_sums(numbers)
@@ -191,7 +184,7 @@ def known_numbers(data: Data) -> dict[str, tuple[float, float]]:
 
 def unknown_errors(data: Data, errors: Mapping[str, float]) -> dict[str, float]:
     """Return the standard errors of numbers by a fit's unknowns: static − coulomb is `.drop`, 1/vs is `.rate`."""
-    names = dict(zip(MAGNITUDES, ("drop", "coulomb", "rate", "viscous"), strict=True))
+    names = dict(zip(LAW_NUMBERS, ("drop", "coulomb", "rate", "viscous"), strict=True))
     result = {}
     for number in estimable_numbers(data):
         if number.path in errors:
@@ -201,7 +194,7 @@ def unknown_errors(data: Data, errors: Mapping[str, float]) -> dict[str, float]:
     return result
 
 
-def _coulomb_sums(numbers: Sequence[Unknown]) -> dict[str, Numbers]:
+def _coulomb_sums(numbers: Sequence[Number]) -> dict[str, Numbers]:
     """Return the weights [p] of the Coulomb friction of each place, and of each tendon."""
     places: dict[str, list[int]] = {}
     for k, number in enumerate(numbers):

@@ -17,14 +17,11 @@ import numpy as np
 from tendonfmu.arrays import Numbers
 from tendonfmu.model import (
     DEFAULTS,
-    Effect,
-    effects,
-    extension_numbers,
+    Finger,
+    Number,
     friction_probe,
     native,
     number_of,
-    steps_of,
-    working_point_weights,
 )
 
 Progress = Callable[[int, int], None]
@@ -33,132 +30,23 @@ STEP = 1e-4  # of a value: T is linear in three of the four numbers of a law, an
 _ELEMENTS = 4_000_000  # sensitivities in memory at a time
 
 
-@dataclass(frozen=True)
-class Unknown:
-    """A number of the description to be estimated."""
-
-    path: str  # path in the description
-    value: float  # value in SI units
-    effect: Effect | None = None  # friction effect that the number belongs to, if any
-    point: int = 0  # which of the laws of the effect, from 0
-    with_path: str | None = None  # number that moves by the same amount (static where it equals coulomb), if any
-    extension: str | None = None  # name of the effect in `extensions` that the number belongs to, if any
-    size: float = 1.0  # expected magnitude, where the value may be 0
-
-    @property
-    def kind(self) -> str:
-        """What the number belongs to: edge_friction, cover, bias, extensions.gravity."""
-        if self.effect is not None:
-            return self.effect.kind
-        if self.extension is not None:
-            return f"extensions.{self.extension}"
-        return self.path.rsplit(".", 1)[0].rsplit(".", 1)[-1].split("[")[0]
-
-    @property
-    def key(self) -> str:
-        """Last part of the path: static, coulomb, stribeck_velocity, viscous, stiffness."""
-        return self.path.rsplit(".", 1)[1]
-
-    @property
-    def reference(self) -> float:
-        """Size that steps and errors are relative to: the value, or if that is 0 the static friction of its law."""
-        if self.value or self.effect is None:
-            return abs(self.value) or self.size
-        law = self.effect.laws[self.point]
-        return float(law.get(self.path.split(".")[-2], law)["static"]) or 1.0
-
-
-def unknowns(data: Mapping[str, Any]) -> list[Unknown]:
-    """List the numbers that a fit estimates, without the biases, which are tracked."""
-    numbers = [number for effect in effects(data) for number in _numbers_of(effect)]
-    for j, joint in enumerate(data["joints"], start=1):
-        stiffness = (joint.get("cover") or {}).get("stiffness")
-        if stiffness:
-            numbers.append(Unknown(f"joints[{j}].cover.stiffness", float(stiffness)))
-    numbers += [
-        Unknown(each.path, each.value, extension=each.effect, size=each.magnitude)
-        for each in extension_numbers(data)
-        if not each.left_out
-    ]
-    return numbers
-
-
-def _numbers_of(effect: Effect) -> Iterator[Unknown]:
-    for point, (path, law) in enumerate(zip(effect.law_paths, effect.laws, strict=True)):
-        asymmetric = law.get("positive") is not None
-        for side in ("positive", "negative") if asymmetric else ("",):
-            values, prefix = (law[side], f"{path}.{side}") if side else (law, path)
-            stribeck = values["static"] != values["coulomb"]
-            tied = None if stribeck else f"{prefix}.static"
-            yield Unknown(f"{prefix}.coulomb", float(values["coulomb"]), effect, point, tied)
-            for key in ("static", "stribeck_velocity") if stribeck else ():
-                yield Unknown(f"{prefix}.{key}", float(values[key]), effect, point)
-            if values.get("viscous"):
-                yield Unknown(f"{prefix}.viscous", float(values["viscous"]), effect, point)
-
-
 # --- sensitivities ----------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class _Bundle:
-    """Numbers that one run changes together, because their effects can be separated afterwards."""
-
-    members: list[Unknown]
-    columns: list[int]
-
-    @property
-    def steps(self) -> list[tuple[str, float]]:
-        """Paths, and what is added to each."""
-        return [
-            (path, _sign(number) * STEP * number.reference)
-            for number in self.members
-            for path in (number.path, number.with_path)
-            if path is not None
-        ]
-
-    def shares(self, joint_position: Numbers) -> Iterator[tuple[int, Unknown, slice, Numbers]]:
-        """Yield (column, number, its joints as a slice, [N, 1] 1 where the change of a sample is due to the number)."""
-        effect = self.members[0].effect
-        active = np.ones((len(joint_position), len(self.members)))
-        if effect is not None and len(effect.angles) > 1:
-            weights = working_point_weights(effect, joint_position)
-            active = (weights[:, [number.point for number in self.members]] > 0).astype(float)
-        for k, (column, number) in enumerate(zip(self.columns, self.members, strict=True)):
-            joint = _joint_of(number)
-            yield column, number, slice(joint, None if joint is None else joint + 1), active[:, k : k + 1]
-
-
-def _bundles(numbers: Sequence[Unknown]) -> list[_Bundle]:
-    groups: dict[str, list[int]] = {}
-    for column, number in enumerate(numbers):
-        name = number.path
-        if _joint_of(number) is not None:
-            name = number.path.split(".", 1)[1]
-        elif number.effect is not None and len(number.effect.angles) > 1:
-            name = f"{number.effect.path}{number.path.split(']')[-1]} {number.point % 2}"
-        groups.setdefault(name, []).append(column)
-    return [_Bundle([numbers[k] for k in columns], columns) for columns in groups.values()]
-
-
-def _joint_of(number: Unknown) -> int | None:
-    """Return the joint, from 0, whose own friction or cover the number belongs to, else None."""
-    owner, index, *_ = steps_of(number.path)
-    return index if owner == "joints" and isinstance(index, int) else None
-
-
-def _sign(number: Unknown) -> int:
+def _sign(number: Number) -> int:
     """Return the direction of the step: coulomb friction and delays step down, since both have an upper limit."""
     down = number.key == "delay" or (number.key == "coulomb" and number.with_path is None)
     return -1 if down and number.value > 0 else 1
 
 
 class _Run:
-    """A finger with some numbers changed, advanced over a motion part by part."""
+    """A finger with a number changed, advanced over a motion part by part."""
 
-    def __init__(self, finger: native.Instance, steps: Sequence[tuple[str, float]]) -> None:
-        plain = {path: finger.get(path) for path, _ in steps}
-        finger.set({path: plain[path] + step for path, step in steps})
+    def __init__(self, finger: native.Instance, number: Number | None = None) -> None:
+        self.step = STEP if number is None else _sign(number) * STEP  # relative
+        plain = {} if number is None else {path: finger.get(path) for path in number.paths}
+        step = 0.0 if number is None else self.step * number.reference
+        finger.set({path: value + step for path, value in plain.items()})
         self._state = finger.save_state()
         finger.set(plain)
         self._bias = np.zeros((1, finger.joints))
@@ -175,14 +63,13 @@ class _Run:
 
 
 def sensitivities(
-    data: Mapping[str, Any], numbers: Sequence[Unknown], motion: Mapping[str, Numbers], progress: Progress | None = None
+    described: Finger, numbers: Sequence[Number], motion: Mapping[str, Numbers], progress: Progress | None = None
 ) -> Iterator[Numbers]:
     """Compute the change of T_eff per relative change of each number; only fig. 5 moves the bias."""
     # motion: [N] (s); returns [S, n, p] of successive parts of the motion (N·m)
-    finger = friction_probe(data)
+    finger = friction_probe(described)
     samples, joints = motion["joint_position"].shape
-    bundles = _bundles(numbers)
-    base, runs = _Run(finger, ()), [_Run(finger, bundle.steps) for bundle in bundles]
+    base, runs = _Run(finger), [_Run(finger, number) for number in numbers]
     held = np.zeros((joints, len(numbers)))  # by the bias, from the parts before
     length = max(200, _ELEMENTS // (joints * max(len(numbers), 1)))
     starts = range(0, samples, length)
@@ -190,29 +77,14 @@ def sensitivities(
         part = {name: values[begin : begin + length] for name, values in motion.items()}
         plain = base.advance(finger, part)
         changes = np.zeros((len(part["time"]), joints, len(numbers)))
-        for done, (bundle, run) in enumerate(zip(bundles, runs, strict=True), start=1):
-            moved = run.advance(finger, part)
-            _share_out(bundle, moved, plain, part["joint_position"], changes, held)
+        for k, run in enumerate(runs):
+            torque, jump = ((new - old) / run.step for new, old in zip(run.advance(finger, part), plain, strict=True))
+            bias = held[:, k] + np.cumsum(jump, axis=0)
+            changes[:, :, k] = torque + bias
+            held[:, k] = bias[-1]
             if progress is not None:
-                progress(number * len(bundles) + done, len(starts) * len(bundles))
+                progress(number * len(runs) + k + 1, len(starts) * len(runs))
         yield changes
-
-
-def _share_out(
-    bundle: _Bundle,
-    moved: tuple[Numbers, Numbers],
-    plain: tuple[Numbers, Numbers],
-    joint_position: Numbers,
-    changes: Numbers,
-    held: Numbers,
-) -> None:
-    """Write the columns of a bundle into `changes`, and what its bias holds at the end into `held`."""
-    torque, jump = ((new - old) / STEP for new, old in zip(moved, plain, strict=True))
-    for column, number, joint, active in bundle.shares(joint_position):
-        sign = _sign(number)
-        bias = held[joint, column] + sign * np.cumsum((active * jump)[:, joint], axis=0)
-        changes[:, joint, column] = sign * (active * torque)[:, joint] + bias
-        held[joint, column] = bias[-1]
 
 
 # --- information ------------------------------------------------------------------------------------------------------

@@ -5,31 +5,145 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, cast
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.arrays import Data, Numbers
+from tendonfmu.arrays import Numbers
 from tendonfmu.estimate.core_runs import CoreRuns, SlowDrift
 from tendonfmu.estimate.estimation import Unknown
-from tendonfmu.estimate.files import FIT_REPORT
-from tendonfmu.estimate.fit_types import (
-    Comparison,
-    FitReport,
-    FittedNumber,
-    GivenNumbers,
-    Innovations,
-    MemoryEntry,
-    ResidualRms,
-)
-from tendonfmu.estimate.learning import Learned, unknown_names
+from tendonfmu.estimate.learning import Learned
 from tendonfmu.estimate.verdicts import CAUSES, Fitted
-from tendonfmu.files import counted, finite
-from tendonfmu.json_types import Values
-from tendonfmu.model import Effect, Finger, Law, without_friction
-from tendonfmu.recordings import FitRecording, Model, RoutingEntry, consistency, rms, whiteness
+from tendonfmu.files import counted
+from tendonfmu.json_types import Count, Index, Number, Schema, Size, Values
+from tendonfmu.model import Effect, Finger, Law, finger_of, without_friction
+from tendonfmu.recordings import (
+    FitRecording,
+    Model,
+    Nis,
+    RecordingEntry,
+    RoutingEntry,
+    Whiteness,
+    consistency,
+    rms,
+    whiteness,
+)
 from tendonfmu.statistics import effective_samples
+
+if TYPE_CHECKING:
+    from typing_extensions import NotRequired
+
+
+class FittedNumber(TypedDict):
+    path: str
+    unit: str
+    start: float
+    value: float
+    standard_error: Size | None
+    # Whether the standard error is at most 30 % of the value and half of what was known before.
+    identified: bool
+    at_bound: Annotated[str, Schema(enum=["lower", "upper"])] | None
+    reason: (
+        Annotated[str, Schema(enum=["side", "working_point", "slow", "noise", "combination", "never_moves", "kept"])]
+        | None
+    )
+    explanation: str | None
+    advice: str | None  # Motion, load or option that would identify the number.
+
+
+class Correlation(TypedDict):
+    paths: list[str]  # Paths of the unknowns: .drop is static - coulomb, .rate is 1/stribeck_velocity.
+    standard_errors: list[Size | None]  # Standard errors of the unknowns.
+    matrix: list[list[Annotated[float, Schema(minimum=-1.001, maximum=1.001)]]]
+
+
+class GivenNumbers(TypedDict):
+    """What became of the numbers that the fit was given."""
+
+    start: Annotated[str, Schema(enum=["guessed", "estimated"])]  # estimated: they are the prior.
+    kept: bool  # Whether all of them are kept, because fitted ones need not do better.
+    moved: Count  # Values that moved by more than their standard error.
+    stayed: list[str]  # Paths of the others.
+    paragraph: str  # The same in words, with the reasons.
+
+
+class MemoryEntry(TypedDict):
+    angles: str  # Source of the joint angles that the numbers were fitted to.
+    left: Values  # N.m by joint; rms without a learning bias, with these angles.
+    left_delivered: Values  # N.m by joint; the same with the kinematics of the delivered finger.
+    left_out: list[str]  # Paths of the numbers that the motion does not show.
+
+
+class Identified(TypedDict):
+    count: Count
+    of: Index
+
+
+class ResidualRms(TypedDict):
+    """N.m by joint, before the bias learns from the sample."""
+
+    rms: Values
+    start_rms: Values
+    bias_only_rms: Values
+    model_only_rms: Values
+    torque_rms: Values
+
+
+class Comparison(RecordingEntry):
+    """A recording to compare with, and its residuals as those of the training."""
+
+    label: str
+    rms: NotRequired[Values]
+    start_rms: NotRequired[Values]
+    bias_only_rms: NotRequired[Values]
+    model_only_rms: NotRequired[Values]
+    torque_rms: NotRequired[Values]
+
+
+class Residual(TypedDict):
+    train: ResidualRms
+    held_out: ResidualRms | None
+    comparisons: list[Comparison]
+
+
+class Effective(TypedDict):
+    """By joint: samples trained on, and the number of independent samples that they are worth."""
+
+    samples: list[float]
+    worth: list[float]
+
+
+class Innovations(TypedDict):
+    nis: Nis
+    whiteness: Whiteness
+    effective: Effective
+
+
+class FitReport(TypedDict):
+    """Report of `tendonfmu fit --report`. SI units; null stands for a value that is not a number."""
+
+    format: Literal["tendonfmu-fit-1"]
+    finger: str  # Name of the finger.
+    method: Annotated[str, Schema(enum=["batch", "ekf"])]
+    converged: bool
+    finished: Literal[True]
+    iterations: Count
+    passes: Count  # Passes over the data, coarse ones included.
+    seconds: Size  # s; time of the estimation.
+    cost: Number  # Half the sum of the squared standardised innovations, plus the part of the prior.
+    options: Mapping[str, Any]
+    warnings: list[str]
+    recordings: Annotated[list[RecordingEntry], Schema(minItems=1)]
+    parameters: Annotated[list[FittedNumber], Schema(minItems=1)]
+    correlation: Correlation
+    routing: NotRequired[RoutingEntry | None]
+    given_numbers: NotRequired[GivenNumbers]
+    memory: NotRequired[MemoryEntry | None]  # How friction that remembers (presliding) was fitted; null without it.
+    identified: Identified
+    residual: Residual
+    innovations: Innovations
+
 
 # --- one recording under a finger -------------------------------------------------------------------------------------
 
@@ -45,7 +159,7 @@ class Evaluation:
     model_only: Numbers  # [N, n] y − T less a constant per part (N·m)
 
 
-def evaluate(start: Data, fitted: Data, recording: FitRecording) -> Evaluation:
+def evaluate(start: Finger, fitted: Finger, recording: FitRecording) -> Evaluation:
     """Judge a fitted finger on a recording."""
     model = recording.run(fitted)
     rest = recording.target - model.torque
@@ -53,7 +167,8 @@ def evaluate(start: Data, fitted: Data, recording: FitRecording) -> Evaluation:
         chosen = recording.train[part] if recording.train[part].any() else recording.tracked[part]
         if chosen.any():
             rest[part] -= rest[part][chosen].mean(axis=0)
-    return Evaluation(recording, model, recording.run(start), recording.run(without_friction(fitted)), rest)
+    bare = finger_of(without_friction(fitted.data))
+    return Evaluation(recording, model, recording.run(start), recording.run(bare), rest)
 
 
 def residual_entry(evaluations: Sequence[Evaluation], which: str) -> ResidualRms | None:
@@ -81,58 +196,8 @@ LEAST_NIS, MOST_NIS, MOST_LAG_ONE = 0.5, 2.0, 0.3  # values outside give a warni
 _MORE_PASSES = ": allow more (--passes), or estimate fewer numbers (--only, --fix, --share)"
 
 
-def build_report(
-    *,
-    fitted: Finger,
-    learned: Learned,
-    seconds: float,  # time of the estimation (s)
-    options: Mapping[str, Any],  # options that shape the result, and `method`
-    warnings: Sequence[str],
-    numbers: Sequence[Fitted],
-    routing: RoutingEntry | None,  # what was learned of it; None if not asked for
-    movement: GivenNumbers,  # what became of the given numbers
-    innovations: Sequence[Numbers],  # by recording, [N, n] standardised; NaN where not trained on
-    training: Sequence[Evaluation],
-    comparisons: Sequence[Evaluation],
-    memory: MemoryEntry | None,  # how friction that remembers was fitted; None if there is none
-) -> FitReport:
-    """Build the report of a finished fit; numbers that are not finite become None."""
-    trained = residual_entry(training, "train")
-    assert trained is not None, "a fit is trained on something"
-    report: FitReport = {
-        "format": FIT_REPORT,
-        "finger": fitted.name,
-        "method": options["method"],
-        "converged": learned.converged,
-        "finished": True,
-        "iterations": learned.iterations,
-        "passes": learned.passes,
-        "seconds": seconds,
-        "cost": learned.cost,
-        "options": dict(options),
-        "warnings": list(warnings),
-        "recordings": [evaluation.recording.entry() for evaluation in training],
-        "parameters": [_parameter(number, fitted) for number in numbers],
-        "correlation": {
-            "paths": unknown_names(learned.estimator),
-            "standard_errors": np.sqrt(np.maximum(np.diag(learned.covariance), 0.0)).tolist(),
-            "matrix": _correlation(learned.covariance),
-        },
-        "routing": routing,
-        "given_numbers": movement,
-        "identified": {"count": sum(number.identified for number in numbers), "of": len(numbers)},
-        "residual": {
-            "train": trained,
-            "held_out": residual_entry(training, "held_out"),
-            "comparisons": [_comparison(evaluation) for evaluation in comparisons],
-        },
-        "innovations": _innovations(innovations, learned.weights),
-        "memory": memory,
-    }
-    return finite(report)
-
-
-def _parameter(number: Fitted, finger: Finger) -> FittedNumber:
+def parameter_entry(number: Fitted, finger: Finger) -> FittedNumber:
+    """Return what the report says of a number."""
     return {
         "path": number.number.path,
         "unit": finger.numbers[number.number.path].unit,
@@ -147,7 +212,7 @@ def _parameter(number: Fitted, finger: Finger) -> FittedNumber:
     }
 
 
-def _innovations(innovations: Sequence[Numbers], weights: Sequence[Numbers]) -> Innovations:
+def innovations_of(innovations: Sequence[Numbers], weights: Sequence[Numbers]) -> Innovations:
     """Describe the residuals of the samples trained on, and how many independent samples they are worth."""
     samples, worth = effective_samples(innovations, weights)
     share = float(worth.sum() / samples.sum()) if samples.sum() else 1.0
@@ -158,12 +223,14 @@ def _innovations(innovations: Sequence[Numbers], weights: Sequence[Numbers]) -> 
     }
 
 
-def _comparison(evaluation: Evaluation) -> Comparison:
+def comparison_entry(evaluation: Evaluation) -> Comparison:
+    """Return what the report says of a recording that is judged only."""
     recording, left = evaluation.recording, residual_entry([evaluation], "train")
     return cast("Comparison", {"label": recording.path.stem, **recording.entry(), **(left or {})})
 
 
-def _correlation(covariance: Numbers) -> list[list[float]]:
+def correlation_of(covariance: Numbers) -> list[list[float]]:
+    """Return the correlations [u, u] of a covariance."""
     error = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     matrix = covariance / np.outer(error, error)
     return [[float(f"{value:.4g}") for value in row] for row in matrix.tolist()]
@@ -211,12 +278,12 @@ def noise_sentences(innovations: Innovations) -> list[str]:
 FAR, MOST_NAMED = 2.0, 4  # a factor by which a number moves far, and such numbers named at most
 
 
-def unseen_square(data: Data, recordings: Sequence[FitRecording]) -> float:
+def unseen_square(finger: Finger, recordings: Sequence[FitRecording]) -> float:
     """Return Σ r² over the samples held out and all joints, (N·m)², without a learning bias; 0 without any."""
     unseen = [replace(recording, train=recording.held_out) for recording in recordings if recording.held_out.any()]
     if not unseen:
         return 0.0
-    runs = CoreRuns(data, unseen)
+    runs = CoreRuns(finger, unseen)
     return float(np.sum(SlowDrift(runs.time, runs.stretch, runs.used).without(runs.residual()) ** 2))
 
 

@@ -8,13 +8,14 @@ from collections.abc import Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from time import perf_counter
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.files import (
+    FIT_REPORT,
     PreviousFit,
     check_given_once,
     estimated_numbers,
@@ -25,23 +26,30 @@ from tendonfmu.estimate.files import (
 from tendonfmu.estimate.fit_report import (
     Evaluation,
     FitPicture,
+    FitReport,
     FitSeries,
-    build_report,
+    GivenNumbers,
+    comparison_entry,
+    correlation_of,
     evaluate,
     fit_sentences,
+    innovations_of,
     is_worse,
     movement,
     noise_sentences,
+    parameter_entry,
+    residual_entry,
     unseen_square,
 )
-from tendonfmu.estimate.identifiability import EffectCoverage, coverage_of, with_laws_of
-from tendonfmu.estimate.learning import FrictionFitOptions, Interrupted, Learned, Watch, settings_of
+from tendonfmu.estimate.identifiability import EffectCoverage, coverage_of
+from tendonfmu.estimate.learning import FrictionFitOptions, Interrupted, Learned, Watch, settings_of, unknown_names
 from tendonfmu.estimate.memory_choice import Remembered, learn_remembered
 from tendonfmu.estimate.methods import learn_batch, learn_ekf
 from tendonfmu.estimate.structure import Choice, build_structure, torque_scales, with_values
 from tendonfmu.estimate.verdicts import Fitted, judge_numbers, sizes_of
-from tendonfmu.model import Finger, number_of, read_finger
-from tendonfmu.options import Configured, FitOptions, Options
+from tendonfmu.files import finite
+from tendonfmu.model import Finger, FingerSource, number_of, read_finger
+from tendonfmu.options import FitOptions
 from tendonfmu.recordings import (
     FitRecording,
     Held,
@@ -72,7 +80,7 @@ class FitWarning(UserWarning):
     """A remark on the recordings or the fit that the user should read; also in `FrictionFit.warnings_`."""
 
 
-class FrictionFit(Configured):
+class FrictionFit:
     """Estimates the numbers of a finger description (paper, sections V and VI).
 
     Parameters
@@ -96,8 +104,8 @@ class FrictionFit(Configured):
         Unknowns of the estimation, [u] their estimate and [u, u] its covariance.
     """
 
-    Options: ClassVar[type[Options]] = FrictionFitOptions
-    options: FrictionFitOptions
+    def __init__(self, finger: FingerSource, **options: Any) -> None:
+        self.finger, self.options = finger, FrictionFitOptions(**options)
 
     # --- fit ----------------------------------------------------------------------------------------------------------
 
@@ -152,7 +160,7 @@ class FrictionFit(Configured):
         compared = [self._prepared(recording, Held()) for recording in others]
         require_noise(self.start_, self.recordings_)
         remarks += self._motion_warnings(not checked)
-        learned = self._learn(previous, Watch(self.progress))
+        learned = self._learn(previous, Watch(self.options.progress))
         if learned is None:
             return self
         # an interruption while the result is judged must not lose the estimate
@@ -208,15 +216,14 @@ class FrictionFit(Configured):
 
     def _evaluated(self, learned: Learned) -> list[Evaluation]:
         self.description_ = learned.fitted(self.structure_)
-        start, fitted = self.start_.data, self.description_.data
-        return [evaluate(start, fitted, recording) for recording in self.recordings_]
+        return [evaluate(self.start_, self.description_, recording) for recording in self.recordings_]
 
     def _conclude(self, learned: Learned, compared: list[FitRecording], remarks: list[str], is_estimated: bool) -> None:
         self.training_ = self._evaluated(learned)
         if learned.memory is None:
             keeps = is_worse(self.training_)
         else:
-            before, after = (unseen_square(each.data, self.recordings_) for each in (self.start_, self.description_))
+            before, after = (unseen_square(each, self.recordings_) for each in (self.start_, self.description_))
             keeps = after > before
         if keeps:
             learned = replace(learned, z=learned.estimator.start)
@@ -225,26 +232,13 @@ class FrictionFit(Configured):
         self.numbers_, self.covariance_ = self._judged(learned)
         self.parameters_ = {number.number.path: number.value for number in self.numbers_}
         self.standard_errors_ = {number.number.path: number.standard_error for number in self.numbers_}
-        self.comparisons_ = [evaluate(self.start_.data, self.description_.data, recording) for recording in compared]
+        self.comparisons_ = [evaluate(self.start_, self.description_, recording) for recording in compared]
         numbers, noise = [each.number for each in self.numbers_], number_of(self.description_.data, "bias.noise_std")
         self.description_ = with_estimates(self.description_, numbers, self.covariance_, sizes_of(numbers, noise))
         self.converged_, self.n_iter_, self.cost_ = learned.converged, learned.iterations, learned.cost
         slack = np.concatenate([each.model.slack[each.recording.train] for each in self.training_])
         self.warnings_ = [*remarks, *slack_sentences(slack, self.description_), *fit_sentences(learned, self.numbers_)]
-        self.report_ = build_report(
-            fitted=self.description_,
-            learned=learned,
-            seconds=self.seconds_,
-            options=_reported(self.options),
-            warnings=self.warnings_,
-            numbers=self.numbers_,
-            routing=self.routing_,
-            movement=movement(self.numbers_, is_estimated, keeps),
-            innovations=learned.innovations or [_trained(evaluation) for evaluation in self.training_],
-            training=self.training_,
-            comparisons=self.comparisons_,
-            memory=None if self.remembered_ is None else self.remembered_.entry(),
-        )
+        self.report_ = self._report(learned, movement(self.numbers_, is_estimated, keeps))
         if self.remembered_ is None:
             self.warnings_ += noise_sentences(self.report_["innovations"])
         else:
@@ -252,10 +246,46 @@ class FrictionFit(Configured):
         self.report_["warnings"] = list(self.warnings_)
         self.finished_ = True
 
+    def _report(self, learned: Learned, moved: GivenNumbers) -> FitReport:
+        """Return all results as JSON has them; numbers that are not finite become None."""
+        trained = residual_entry(self.training_, "train")
+        assert trained is not None, "a fit is trained on something"
+        innovations = learned.innovations or [_trained(evaluation) for evaluation in self.training_]
+        report: FitReport = {
+            "format": FIT_REPORT,
+            "finger": self.description_.name,
+            "method": self.options.method,
+            "converged": learned.converged,
+            "finished": True,
+            "iterations": learned.iterations,
+            "passes": learned.passes,
+            "seconds": self.seconds_,
+            "cost": learned.cost,
+            "options": _reported(self.options),
+            "warnings": list(self.warnings_),
+            "recordings": [evaluation.recording.entry() for evaluation in self.training_],
+            "parameters": [parameter_entry(number, self.description_) for number in self.numbers_],
+            "correlation": {
+                "paths": unknown_names(learned.estimator),
+                "standard_errors": np.sqrt(np.maximum(np.diag(learned.covariance), 0.0)).tolist(),
+                "matrix": correlation_of(learned.covariance),
+            },
+            "routing": self.routing_,
+            "given_numbers": moved,
+            "identified": {"count": sum(each.identified for each in self.numbers_), "of": len(self.numbers_)},
+            "residual": {
+                "train": trained,
+                "held_out": residual_entry(self.training_, "held_out"),
+                "comparisons": [comparison_entry(evaluation) for evaluation in self.comparisons_],
+            },
+            "innovations": innovations_of(innovations, learned.weights),
+            "memory": None if self.remembered_ is None else self.remembered_.entry(),
+        }
+        return finite(report)
+
     def _judged(self, learned: Learned) -> tuple[list[Fitted], Numbers]:
-        data = self.description_.data
-        coverage = with_laws_of(data, self.coverage_)
-        return judge_numbers(self.structure_, learned, self.description_, coverage, number_of(data, "bias.noise_std"))
+        noise = number_of(self.description_.data, "bias.noise_std")
+        return judge_numbers(self.structure_, learned, self.description_, self.coverage_, noise)
 
     # --- what was learned, on other recordings ------------------------------------------------------------------------
 
@@ -280,7 +310,7 @@ class FrictionFit(Configured):
     def _left(self, source: RecordingSource) -> tuple[FitRecording, Numbers]:
         self._require_fitted()
         prepared = self._prepared(source, Held())
-        return prepared, prepared.run(self.description_.data).residual
+        return prepared, prepared.run(self.description_).residual
 
     def _require_fitted(self) -> None:
         if not getattr(self, "finished_", False):

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from tendonfmu.arrays import Numbers
-from tendonfmu.estimate.fisher_information import Unknown
-from tendonfmu.model import Effect, effects, sliding_velocity, velocity_threshold, working_point_weights
+from tendonfmu.model import Effect, Number, effects, sliding_velocity, velocity_threshold, working_point_weights
 
 LIMIT = 0.3  # largest relative standard error of an identifiable number
 PRIOR = 10.0  # relative standard error of the prior: nearly nothing is known, but every information has an inverse
@@ -70,12 +69,6 @@ def coverage_of(
     return [_cover(data, effect, joint_position, joint_velocity, share) for effect in effects(data)]
 
 
-def with_laws_of(data: Mapping[str, Any], coverage: Sequence[EffectCoverage]) -> list[EffectCoverage]:
-    """Combine the coverage of a motion with the laws of another description of the same structure."""
-    by_path = {effect.path: effect for effect in effects(data)}
-    return [replace(cover, effect=by_path[cover.effect.path]) for cover in coverage]
-
-
 def _cover(
     data: Mapping[str, Any], effect: Effect, joint_position: Numbers, joint_velocity: Numbers, share: Numbers
 ) -> EffectCoverage:
@@ -107,7 +100,7 @@ def _ends(speed: Numbers, sides: tuple[Any, Any], end: Any) -> tuple[float | Non
 class Verdict:
     """Whether one number is identifiable, and why not."""
 
-    number: Unknown  # the number
+    number: Number  # the number
     # relative standard error when all numbers are estimated, and when all others are known; at most `PRIOR`
     error: float
     error_alone: float
@@ -140,7 +133,7 @@ class Judgement:
     combinations: list[tuple[float, list[tuple[str, float]]]]
 
 
-def judge(numbers: Sequence[Unknown], information: Numbers, coverage: Sequence[EffectCoverage]) -> Judgement:
+def judge(numbers: Sequence[Number], information: Numbers, coverage: Sequence[EffectCoverage]) -> Judgement:
     """Judge which numbers a motion identifies. information: [p, p]."""
     if not numbers:
         return Judgement([], 0, [])
@@ -154,7 +147,7 @@ def judge(numbers: Sequence[Unknown], information: Numbers, coverage: Sequence[E
 
 
 def explain(
-    numbers: Sequence[Unknown], error: Numbers, alone: Numbers, correlation: Numbers, coverage: Sequence[EffectCoverage]
+    numbers: Sequence[Number], error: Numbers, alone: Numbers, correlation: Numbers, coverage: Sequence[EffectCoverage]
 ) -> list[Verdict]:
     """Explain for each number whether it is identifiable. error, alone: [p]; correlation: [p, p]."""
     by_path = {cover.effect.path: cover for cover in coverage}
@@ -171,7 +164,7 @@ def explain(
     return verdicts
 
 
-def _cause(number: Unknown, cover: EffectCoverage | None, alone: float) -> tuple[str, str]:
+def _cause(number: Number, cover: EffectCoverage | None, alone: float) -> tuple[str, str]:
     reason = unvisited(number, cover) if cover is not None else None
     if reason is not None:
         return reason
@@ -181,7 +174,7 @@ def _cause(number: Unknown, cover: EffectCoverage | None, alone: float) -> tuple
     return "combination", "only in combination with "
 
 
-def unvisited(number: Unknown, cover: EffectCoverage) -> tuple[str, str] | None:
+def unvisited(number: Number, cover: EffectCoverage) -> tuple[str, str] | None:
     """Return (cause, reason) if the motion never does what reveals the number, else None."""
     part = number.path.split(".")[-2]
     sides = [part] if part in ("positive", "negative") else ["positive", "negative"]
@@ -197,8 +190,7 @@ def unvisited(number: Unknown, cover: EffectCoverage) -> tuple[str, str] | None:
         verb = "never slides while joint" if point.total > _TIME else "joint"
         how = "is near" if point.total > _TIME else "never comes near"
         return "working_point", f"{verb} {joint} {how} working point {number.point + 1} at {angle:g} rad"
-    law = cover.effect.laws[number.point]
-    stribeck = float(law.get(part, law)["stribeck_velocity"])
+    stribeck = float(number.side["stribeck_velocity"])
     least = min(
         slow
         for slow, side in zip(cover.slowest, ("positive", "negative"), strict=True)
@@ -209,7 +201,7 @@ def unvisited(number: Unknown, cover: EffectCoverage) -> tuple[str, str] | None:
     return None
 
 
-def _partners(k: int, correlation: Numbers, numbers: Sequence[Unknown]) -> list[str]:
+def _partners(k: int, correlation: Numbers, numbers: Sequence[Number]) -> list[str]:
     """Return the paths of the numbers whose errors correlate most with that of number k, at least one."""
     order = [int(i) for i in np.argsort(-np.abs(correlation)) if i != k]
     near = [i for i in order if abs(correlation[i]) >= _ALIKE][:PARTNERS] or order[:1]
@@ -217,7 +209,7 @@ def _partners(k: int, correlation: Numbers, numbers: Sequence[Unknown]) -> list[
 
 
 def _combinations(
-    numbers: Sequence[Unknown], known: Numbers, alone: Numbers
+    numbers: Sequence[Number], known: Numbers, alone: Numbers
 ) -> list[tuple[float, list[tuple[str, float]]]]:
     """Find the eigenvectors of least information among the numbers that are visible on their own."""
     seen = np.flatnonzero(alone <= LIMIT)

@@ -13,7 +13,7 @@ from tendonfmu.estimate.files import PreviousFit
 from tendonfmu.estimate.memory_fit import MemoryProblem, Minimum
 from tendonfmu.estimate.structure import Structure, with_values
 from tendonfmu.model import Finger, number_of
-from tendonfmu.options import FitOptions, number, option
+from tendonfmu.options import FitOptions, option
 from tendonfmu.recordings import FitRecording
 
 
@@ -21,7 +21,7 @@ from tendonfmu.recordings import FitRecording
 class FrictionFitOptions(FitOptions):
     """Options of `FrictionFit`."""
 
-    threads: int = option(0, number(0, whole=True), "of a batch; 0: all cores")
+    threads: int = option(0, "of a batch; 0: all cores", None, 0)
 
 
 @dataclass(frozen=True)

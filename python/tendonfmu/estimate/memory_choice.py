@@ -18,7 +18,7 @@ import numpy as np
 from tendonfmu.arrays import Data, Numbers
 from tendonfmu.estimate.core_runs import CoreRuns, SlowDrift
 from tendonfmu.estimate.estimation import Estimator
-from tendonfmu.estimate.fit_types import MemoryEntry
+from tendonfmu.estimate.fit_report import MemoryEntry
 from tendonfmu.estimate.learning import Learned, Settings, Watch, unknown_names
 from tendonfmu.estimate.memory import (
     CORDS,
@@ -34,7 +34,7 @@ from tendonfmu.estimate.memory_fit import MemoryProblem, Minimum, minimise
 from tendonfmu.estimate.memory_methods import STEP, coarse_problem, from_starts, full_problem, guess_prior, no_show
 from tendonfmu.estimate.methods import learn_batch
 from tendonfmu.estimate.structure import Choice, Structure, build_structure, with_values
-from tendonfmu.model import Finger, effects, moment_arms, native, number_of
+from tendonfmu.model import Finger, effects, moment_arms, number_of
 from tendonfmu.recordings import FitRecording, best_angles, make_grid
 
 Rows = tuple[dict[str, Any], ...]
@@ -55,7 +55,7 @@ class Form:
 
     name: str
     rows: Rows  # of extensions
-    data: Data  # description with the fitted numbers
+    finger: Finger  # with the fitted numbers
     errors: Numbers  # [K] squared error of each part held out, in variances of the plain model
     numbers: int  # how many were fitted
 
@@ -111,7 +111,7 @@ class _Search:
         """Fit a form: from the starts of `memory.starts`, or from rows near another form and from its numbers."""
         structure, estimator = self._structure(rows[0])
         problem = coarse_problem(structure, estimator, self._recordings, self._grid, self._threads)
-        begin = estimator.start if near is None else self._numbers_of(estimator, with_rows(near.data, *rows[0]))
+        begin = estimator.start if near is None else self._numbers_of(estimator, with_rows(near.finger.data, *rows[0]))
         memories = None if near is None else [memory_values(with_rows(self._finger.data, *each)) for each in rows]
         end = from_starts(problem, begin, TOLERANCE, no_show(problem, name), memories)[0]
         found = minimise(problem, end, STEPS, TOLERANCE)
@@ -119,14 +119,14 @@ class _Search:
             self._variance = problem.variance(found.state.residual)
         fitted = with_values(structure, estimator.values(problem.unknowns_at(found.state)))
         memory = tuple(dict(row) for _, row in memory_rows(fitted.data))
-        form = Form(name, memory, fitted.data, held_out_errors(problem, found, self._variance), len(found.state.u))
+        form = Form(name, memory, fitted, held_out_errors(problem, found, self._variance), len(found.state.u))
         self.tried.append(form)
         return form
 
     def refined(self, form: Form) -> Finger:
         """Return the finger with a form that is fitted to all samples."""
         structure, estimator = self._structure(form.rows)
-        begin = self._numbers_of(estimator, form.data)
+        begin = self._numbers_of(estimator, form.finger.data)
         problem = full_problem(structure, estimator, self._recordings, self._grid, self._threads)
         problem.mean, problem.known = guess_prior(problem)
         found = minimise(problem, problem.state(problem.scale.coordinates(begin)), 30, TOLERANCE, rough=True)
@@ -144,7 +144,7 @@ class _Search:
 
     def _numbers_of(self, estimator: Estimator, data: Data) -> Numbers:
         """Return the unknowns z [u] of a description of the same structure."""
-        return estimator.unknown_values(native.Instance(self._finger.with_data(data).model.image).values())
+        return estimator.unknown_values(self._finger.with_data(data).model.instance().values())
 
 
 def held_out_errors(problem: MemoryProblem, found: Minimum, variance: Numbers) -> Numbers:
@@ -303,11 +303,15 @@ def learn_remembered(
     best = best_angles(structure.start.data, recordings)
     learn = partial(_with_what_shows, structure, choice, watch=watch, settings=settings)
     found, learned, gone = learn(best.recordings)
-    data = learned.fitted(found).data
-    source, left, delivered = best.source, left_without_bias(data, best.recordings), left_without_bias(data, recordings)
+    fitted = learned.fitted(found)
+    source, left, delivered = (
+        best.source,
+        left_without_bias(fitted, best.recordings),
+        left_without_bias(fitted, recordings),
+    )
     if np.sum(delivered**2) > MUCH**2 * np.sum(left**2):
         others = learn(recordings)
-        again = left_without_bias(others[1].fitted(others[0]).data, recordings)
+        again = left_without_bias(others[1].fitted(others[0]), recordings)
         if np.sum(again**2) < np.sum(delivered**2):
             found, learned, gone = others
             source, left, delivered = "the delivered source", again, again
@@ -343,8 +347,8 @@ def _not_shown(structure: Structure, learned: Learned) -> str | None:
     return least if least is not None and costs[least] < state.cost + SHOWN else None
 
 
-def left_without_bias(data: Data, recordings: Sequence[FitRecording]) -> Numbers:
+def left_without_bias(finger: Finger, recordings: Sequence[FitRecording]) -> Numbers:
     """Return [n] the rms of τ − T less a constant a stretch, over the samples trained on (N·m)."""
-    runs = CoreRuns(data, recordings)
+    runs = CoreRuns(finger, recordings)
     left = SlowDrift(runs.time, runs.stretch, runs.used).without(runs.residual())
     return np.asarray(np.sqrt(np.mean(left**2, axis=0)))

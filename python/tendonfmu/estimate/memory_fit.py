@@ -10,7 +10,6 @@ of the Gauss-Newton matrix within them. Numbers of the memory are fitted as thei
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
@@ -23,7 +22,6 @@ from tendonfmu.estimate.core_runs import CoreRuns, SlowDrift
 from tendonfmu.estimate.estimation import Estimator
 from tendonfmu.estimate.memory import memory_paths
 from tendonfmu.estimate.structure import FIXED, Structure
-from tendonfmu.model import native
 
 # --- derivatives by the numbers of laws -------------------------------------------------------------------------------
 # The core takes the share of its limit that friction with a memory holds as constant, which is exact for what slips and
@@ -34,10 +32,8 @@ class LawSlopes:
     """The derivatives over some runs."""
 
     def __init__(self, structure: Structure, runs: CoreRuns) -> None:
-        data = structure.start.data
-        bias = {**(data.get("bias") or {}), "noise_std": 1.0, "forget_rate": 0.0}  # as runs have it
-        image = native.image_from_json(json.dumps({**data, "bias": bias}))
-        self._estimator, self._blocks = Estimator(image, structure.group, structure.scale), runs.grid.blocks
+        finger = structure.start.replace({"bias.noise_std": 1.0, "bias.forget_rate": 0.0})  # as runs have it
+        self._estimator, self._blocks = Estimator(finger.image, structure.group, structure.scale), runs.grid.blocks
         self._stretches = []
         for stretch in runs.stretches:
             number = self._estimator.add_recording(stretch.arrays, stretch.kinematics)

@@ -78,7 +78,7 @@ def coarse_problem(
     structure: Structure, estimator: Estimator, recordings: Sequence[FitRecording], grid: Grid, threads: int
 ) -> MemoryProblem:
     """Return the problem over few windows at a low rate, with the prior of guesses."""
-    runs = CoreRuns(structure.start.data, recordings, windows(grid), rate=COARSE_RATE, threads=threads)
+    runs = CoreRuns(structure.start, recordings, windows(grid), rate=COARSE_RATE, threads=threads)
     problem = MemoryProblem(structure, estimator, runs, SlowDrift(runs.time, runs.stretch, runs.used))
     problem.mean, problem.known = guess_prior(problem)
     return problem
@@ -107,7 +107,7 @@ def from_starts(
     whole = problem.span
     problem.span = _few_directions(problem, first)
     ends: list[State] = []
-    for start in starts(problem.runs.data) if memories is None else memories:
+    for start in starts(problem.runs.finger.data) if memories is None else memories:
         u = first.copy()
         for path, value in start.items():
             if path in places:
@@ -145,7 +145,7 @@ def full_problem(
 ) -> MemoryProblem:
     """Return the problem over all samples, whose drift is the slowest that the rests demand."""
     rate = RATE if grid.step < 2.0 * STEP else COARSE_RATE  # long blocks see less of what is fast
-    runs = CoreRuns(structure.start.data, recordings, grid, rate=rate, threads=threads)
+    runs = CoreRuns(structure.start, recordings, grid, rate=rate, threads=threads)
     drift = slowest_drift(runs.residual(), runs.time, runs.stretch, runs.used, runs.still)
     return MemoryProblem(structure, estimator, runs, drift)
 

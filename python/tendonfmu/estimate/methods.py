@@ -18,7 +18,6 @@ import numpy as np
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError, NothingLeftError
-from tendonfmu.estimate.core_runs import image_that_holds
 from tendonfmu.estimate.estimation import BatchResult, EstimationError, Estimator, Learner
 from tendonfmu.estimate.learning import (
     GUESS,
@@ -48,8 +47,9 @@ def _estimator(structure: Structure, recordings: Sequence[FitRecording]) -> Esti
     # a bias that does not learn at rest must not forget there what it holds
     rests = any(recording.silent.any() for recording in recordings)
     try:
-        image = image_that_holds(structure.start.data) if rests else structure.start.image
-        return Estimator(image, structure.group, structure.scale)
+        start = structure.start
+        held = start.replace({"bias.forget_rate": 0.0, "bias.forgetting": "time"}) if rests else start
+        return Estimator(held.image, structure.group, structure.scale)
     except EstimationError as refused:
         raise InputError(f"{structure.start.path}: {refused}") from None
 

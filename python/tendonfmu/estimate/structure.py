@@ -7,8 +7,9 @@ literal. It matches a number, or a part of the description and thus all numbers 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,21 +17,22 @@ from numpy.typing import NDArray
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError, own_fault
-from tendonfmu.estimate.fisher_information import Unknown, unknowns
 from tendonfmu.estimate.memory import has_memory
 from tendonfmu.model import (
-    DETECTING,
-    LEFT_OUT,
+    LAW_NUMBERS,
     Finger,
+    Law,
+    Number,
     effects,
-    get_number,
+    estimable_numbers,
+    friction_numbers,
     law_path,
+    laws,
     own_copy,
     set_number,
     sides,
 )
 
-MAGNITUDES = ("static", "coulomb", "stribeck_velocity", "viscous")
 FIXED = -1
 DIGITS = 10  # of a fitted number: far finer than any standard error, and static friction stays above coulomb
 
@@ -43,15 +45,22 @@ SCALING = ("force_gain", "moment_arm", "moment_arm_variation", "pulley_eccentric
 class Structure:
     """What is fitted."""
 
-    # description that the fit starts from: laws expanded or merged, shared values made equal
-    start: Finger
-    numbers: list[Unknown]  # the estimated numbers in the order of `unknowns`, `bias.initial_torque` last
+    # what the fit starts from: laws expanded or merged, shared values made equal; with the given detector
+    given: Finger
+    numbers: list[Number]  # the estimated numbers in the order of `estimable_numbers`
     # [p] by parameter of the description in canonical order: −1 is fixed, equal numbers share one value
     group: NDArray[np.int32]
     scale: NDArray[np.float64]  # [p] expected magnitudes; NaN: that of the start
-    index: Mapping[str, int]  # path -> index among the p parameters
-    # of the description: what `start` lacks or has in part
-    beside: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def start(self) -> Finger:
+        """The friction model that the fit starts from."""
+        return self.given.model
+
+    @cached_property
+    def index(self) -> Mapping[str, int]:
+        """Path -> index among the p parameters."""
+        return {path: k for k, path in enumerate(self.start.numbers)}
 
     @property
     def needs_runs(self) -> bool:
@@ -72,7 +81,7 @@ class Choice:
 
 def torque_scales(data: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the paths of the numbers that scale the measured torque, which motion alone does not tell."""
-    return tuple(number.path for number in unknowns(data) if number.extension in SCALING)
+    return tuple(number.path for number in friction_numbers(data) if number.extension in SCALING)
 
 
 def build_structure(finger: Finger, choice: Choice) -> Structure:
@@ -81,55 +90,27 @@ def build_structure(finger: Finger, choice: Choice) -> Structure:
         [finger.numbered(text) for text in texts] for texts in (choice.only, choice.fix, choice.share, choice.scale)
     )
     choice = Choice(choice.sides, only, fix, share, scale)
-    data = with_sides(finger.model.data, choice.sides)
-    numbers = estimable_numbers(data)
+    finger = finger.with_data(with_sides(finger.data, choice.sides))
+    numbers = estimable_numbers(finger.data)
     if not numbers:
         raise InputError(f"{finger.path}: nothing to estimate: no friction, cover or extension; expected at least one")
     chosen = _chosen(numbers, choice)
-    owners = _owners(chosen, data, choice.share)
-    data = _with_equal_values(data, chosen, owners)
-    start = finger.with_data(data)
-    index = {path: k for k, path in enumerate(start.numbers)}
+    owners = _owners(chosen, choice.share)
+    finger = _with_equal_values(finger, chosen, owners)
+    index = {path: k for k, path in enumerate(finger.model.numbers)}
     group = np.full(len(index), FIXED, dtype=np.int32)
     for number, owner in zip(chosen, owners, strict=True):
-        group[index[number.path]] = owner
-        if number.with_path is not None:
-            group[index[number.with_path]] = owner
-    return Structure(
-        start=start,
-        beside={key: finger.data[key] for key in DETECTING if finger.data.get(key) is not None},
-        numbers=_numbered(start, chosen),
-        group=group,
-        scale=_scales(index, chosen, choice.scale),
-        index=index,
-    )
+        group[[index[path] for path in number.paths]] = owner
+    return Structure(finger, numbers_in(finger, chosen), group, _scales(index, chosen, choice.scale))
 
 
-def values_of(structure: Structure, finger: Finger) -> list[Unknown]:
-    """Return the estimated numbers with their values in another description of the same structure."""
-    return _numbered(finger, structure.numbers)
-
-
-def _numbered(finger: Finger, numbers: Sequence[Unknown]) -> list[Unknown]:
+def numbers_in(finger: Finger, numbers: Sequence[Number]) -> list[Number]:
+    """Return numbers with their values in another finger of the same structure."""
     by_path = {effect.path: effect for effect in effects(finger.data)}
     return [
-        replace(
-            number,
-            value=_value(finger.data, number.path),
-            effect=None if number.effect is None else by_path[number.effect.path],
-        )
+        replace(number, value=finger.numbers[number.path].start, effect=number.effect and by_path[number.effect.path])
         for number in numbers
     ]
-
-
-def estimable_numbers(data: Mapping[str, Any]) -> list[Unknown]:
-    """List the numbers that a fit of a parsed description may estimate: all present, `bias.initial_torque` last."""
-    return [*unknowns(data), *_initial_torques(data)]
-
-
-def _initial_torques(data: Mapping[str, Any]) -> list[Unknown]:
-    given = (data.get("bias") or {}).get("initial_torque") or []
-    return [Unknown(f"bias.initial_torque[{j}]", float(value)) for j, value in enumerate(given, start=1)]
 
 
 # --- the fitted description -------------------------------------------------------------------------------------------
@@ -137,22 +118,14 @@ def _initial_torques(data: Mapping[str, Any]) -> list[Unknown]:
 
 def with_values(structure: Structure, values: Numbers) -> Finger:
     """Replace the estimated numbers in the description of the start. values: [p]."""
-    data = own_copy(structure.start.data)
-    for number in structure.numbers:
-        for path in (number.path, number.with_path):
-            if path is not None:
-                set_number(data, path, float(f"{values[structure.index[path]]:.{DIGITS}g}"))
+    index, known = structure.index, structure.given.numbers
+    new = {path: float(f"{values[index[path]]:.{DIGITS}g}") for number in structure.numbers for path in number.paths}
     for number in structure.numbers:  # rounding must not take Fc above an Fs that is not rounded
-        law, _, last = number.path.rpartition(".")
-        if (
-            last == "coulomb"
-            and not law.startswith("extensions[")
-            and get_number(data, f"{law}.static") < get_number(data, number.path)
-        ):
-            set_number(data, number.path, get_number(data, f"{law}.static"))
-    data |= structure.beside
+        if number.key == "coulomb" and number.effect is not None:
+            static = f"{number.path.rpartition('.')[0]}.static"
+            new[number.path] = min(new[number.path], new.get(static, known[static].start))
     with own_fault("the fitted description"):  # a fit keeps within every bound
-        return structure.start.with_data(data)
+        return structure.given.replace(new)
 
 
 # --- sides of laws ----------------------------------------------------------------------------------------------------
@@ -163,35 +136,21 @@ def with_sides(data: Mapping[str, Any], wanted: str) -> Mapping[str, Any]:
     if wanted == "given":
         return data
     change = _two_sides if wanted == "asymmetric" else _one_side
-    result: dict[str, Any] = own_copy(data)
-    for joint in result["joints"]:
-        for kind in ("friction", "load_friction"):
-            if joint.get(kind) is not None:
-                joint[kind] = change(joint[kind])
-    for tendon in result["tendons"]:
-        for kind in ("pulley_friction", "edge_friction"):
-            if tendon.get(kind) is not None:
-                tendon[kind] = [_of_entry(entry, change) for entry in tendon[kind]]
+    result = own_copy(data)
+    for path, _, law in list(laws(result)):
+        set_number(result, path, change(law))
     return result
 
 
-def _of_entry(entry: Any, change: Callable[[Any], Any]) -> Any:
-    if entry is None:
-        return None
-    if entry.get("laws") is not None:
-        return {**entry, "laws": [change(law) for law in entry["laws"]]}
-    return change(entry)
-
-
-def _two_sides(law: dict[str, Any]) -> dict[str, Any]:
+def _two_sides(law: Law) -> Law:
     return law if len(sides(law)) == 2 else {"positive": dict(law), "negative": dict(law)}
 
 
-def _one_side(law: dict[str, Any]) -> dict[str, Any]:
+def _one_side(law: Law) -> Law:
     both = sides(law)
     if len(both) == 1:
         return law
-    mean = {key: float(np.mean([side.get(key) or 0.0 for side in both])) for key in MAGNITUDES}
+    mean = {key: float(np.mean([side.get(key) or 0.0 for side in both])) for key in LAW_NUMBERS}
     return {key: value for key, value in mean.items() if key != "viscous" or value}
 
 
@@ -204,26 +163,26 @@ def matcher(pattern: str) -> re.Pattern[str]:
     return re.compile(rf"({body})((?:[.\[].*)?)")
 
 
-def _select(numbers: Sequence[Unknown], patterns: Iterable[str], option: str) -> set[str]:
+def _select(numbers: Sequence[Number], patterns: Iterable[str], option: str) -> set[str]:
     """Return the paths of the numbers that match any pattern. Raises InputError if a pattern matches none."""
     selected: set[str] = set()
     for pattern in patterns:
         match = matcher(pattern).fullmatch
-        hits = {n.path for n in numbers if match(n.path) or (n.with_path is not None and match(n.with_path))}
+        hits = {number.path for number in numbers if any(map(match, number.paths))}
         if not hits:
             raise InputError(_no_match(option, pattern, numbers))
         selected |= hits
     return selected
 
 
-def _no_match(option: str, pattern: str, numbers: Sequence[Unknown]) -> str:
+def _no_match(option: str, pattern: str, numbers: Sequence[Number]) -> str:
     return (
         f"{option} {pattern}: matches none of the {len(numbers)} numbers that a fit of this finger estimates; "
         f"expected a path such as {numbers[0].path}, where * stands for anything"
     )
 
 
-def _chosen(numbers: list[Unknown], choice: Choice) -> list[Unknown]:
+def _chosen(numbers: list[Number], choice: Choice) -> list[Number]:
     only = _select(numbers, choice.only, "--only") if choice.only else {number.path for number in numbers}
     fixed = _select(numbers, choice.fix, "--fix")
     chosen = [number for number in numbers if number.path in only - fixed]
@@ -232,7 +191,7 @@ def _chosen(numbers: list[Unknown], choice: Choice) -> list[Unknown]:
     return chosen
 
 
-def _scales(index: Mapping[str, int], chosen: Sequence[Unknown], given: Sequence[str]) -> NDArray[np.float64]:
+def _scales(index: Mapping[str, int], chosen: Sequence[Number], given: Sequence[str]) -> NDArray[np.float64]:
     scale = np.full(len(index), np.nan)
     for text in given:
         pattern, _, number = text.rpartition("=")
@@ -250,10 +209,10 @@ def _scales(index: Mapping[str, int], chosen: Sequence[Unknown], given: Sequence
 # --- sharing ----------------------------------------------------------------------------------------------------------
 
 
-def _owners(numbers: Sequence[Unknown], data: Mapping[str, Any], share: Sequence[str]) -> list[int]:
+def _owners(numbers: Sequence[Number], share: Sequence[str]) -> list[int]:
     """Return [numbers] the group of each: its own index, or that of the first number that it shares a value with."""
     owners = list(range(len(numbers)))
-    for key in _shared_keys(numbers, data, share):
+    for key in _shared_keys(numbers, share):
         first: dict[str, int] = {}
         for k, name in enumerate(key):
             if name is None:
@@ -264,9 +223,7 @@ def _owners(numbers: Sequence[Unknown], data: Mapping[str, Any], share: Sequence
     return owners
 
 
-def _shared_keys(
-    numbers: Sequence[Unknown], data: Mapping[str, Any], share: Sequence[str]
-) -> Iterator[list[str | None]]:
+def _shared_keys(numbers: Sequence[Number], share: Sequence[str]) -> Iterator[list[str | None]]:
     """Yield per option [numbers] a key, equal where values are shared and None where nothing is shared."""
     for asked in share:
         if asked == "tendons":  # the same place of every tendon
@@ -282,7 +239,7 @@ def _shared_keys(
         yield keys
 
 
-def _place(number: Unknown, left_out: str, only: str | None = None) -> str | None:
+def _place(number: Number, left_out: str, only: str | None = None) -> str | None:
     """Name where along a tendon a number is, without its tendon or its joint; working points by their angle."""
     law = law_path(number.path)
     if law is None or law.tendon is None or law.kind != (only or law.kind):
@@ -291,16 +248,16 @@ def _place(number: Unknown, left_out: str, only: str | None = None) -> str | Non
     return repr([*(part for name, part in parts.items() if name != left_out), law.point and _angle(number)])
 
 
-def _rest(number: Unknown, rest: str) -> str:
+def _rest(number: Number, rest: str) -> str:
     """Return the part after a match, working points by their angle; the magnitude if the match is the whole path."""
     return re.sub(r"\.laws\[\d+\]", f".laws@{_angle(number)}", rest) if rest else number.key
 
 
-def _angle(number: Unknown) -> str:
+def _angle(number: Number) -> str:
     return repr(number.effect.angles[number.point]) if number.effect is not None and number.effect.angles else ""
 
 
-def _check_alike(numbers: Sequence[Unknown], owners: Sequence[int]) -> None:
+def _check_alike(numbers: Sequence[Number], owners: Sequence[int]) -> None:
     """Check that shared numbers are of the same kind, and that all or none have a Stribeck effect."""
     for number, owner in zip(numbers, owners, strict=True):
         first = numbers[owner]
@@ -316,26 +273,11 @@ def _check_alike(numbers: Sequence[Unknown], owners: Sequence[int]) -> None:
             )
 
 
-def _with_equal_values(data: Mapping[str, Any], numbers: Sequence[Unknown], owners: Sequence[int]) -> Mapping[str, Any]:
+def _with_equal_values(finger: Finger, numbers: Sequence[Number], owners: Sequence[int]) -> Finger:
     """Start numbers that share a value from their mean."""
-    if len(set(owners)) == len(owners):
-        return data
-    result = own_copy(data)
+    values: dict[str, float] = {}
     for owner in set(owners):
         members = [number for number, own in zip(numbers, owners, strict=True) if own == owner]
         mean = float(np.mean([member.value for member in members]))
-        for member in members:
-            set_number(result, member.path, mean)
-            if member.with_path is not None:
-                set_number(result, member.with_path, mean)
-    return result
-
-
-def _value(data: Any, path: str) -> float:
-    """Return a number; if an extension leaves it out, the value that the core assumes."""
-    try:
-        return float(get_number(data, path))
-    except KeyError:
-        if not path.startswith("extensions["):
-            raise
-        return LEFT_OUT.get(path.rpartition(".")[2], 0.0)
+        values |= {path: mean for member in members for path in member.paths if len(members) > 1}
+    return finger.replace(values) if values else finger

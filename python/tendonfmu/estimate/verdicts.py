@@ -8,16 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from tendonfmu.arrays import Numbers
-from tendonfmu.estimate.estimation import Estimator
-from tendonfmu.estimate.estimation import Unknown as FittedUnknown
+from tendonfmu.estimate.estimation import Estimator, Unknown
 from tendonfmu.estimate.files import with_estimates
-from tendonfmu.estimate.fisher_information import Unknown, unknowns
 from tendonfmu.estimate.identifiability import CAUSES as CAUSES_OF_A_MOTION
 from tendonfmu.estimate.identifiability import LIMIT, PRIOR, EffectCoverage, Verdict, explain, unvisited
 from tendonfmu.estimate.learning import Learned
 from tendonfmu.estimate.methods import learned_at
-from tendonfmu.estimate.structure import Choice, Structure, build_structure, values_of
-from tendonfmu.model import Finger, number_of
+from tendonfmu.estimate.structure import Choice, Structure, build_structure, numbers_in
+from tendonfmu.model import Finger, Number, friction_numbers, number_of
 from tendonfmu.recordings import FitRecording
 
 CAUSES = {
@@ -35,7 +33,7 @@ _AT_BOUND = 1e-6
 class Fitted:
     """One number after a fit."""
 
-    number: Unknown  # the number, with its fitted value
+    number: Number  # the number, with its fitted value
     start: float  # value before the fit
     standard_error: float  # standard error of the value
     at_bound: str | None  # "lower", "upper" or None
@@ -57,7 +55,7 @@ class Fitted:
 def slopes(estimator: Estimator, z: Numbers) -> Numbers:
     """Compute [p, u] the derivatives of all numbers of the description by the unknowns, for the delta method."""
     # The map is static = coulomb + drop and vs = 1/rate. The derivatives are its finite differences within the bounds.
-    base = np.asarray(estimator.values(z))
+    base = estimator.values(z)
     columns = []
     for k, unknown in enumerate(estimator.unknowns):
         # a step of a small drop must change static = coulomb + drop, however large coulomb is
@@ -66,7 +64,7 @@ def slopes(estimator: Estimator, z: Numbers) -> Numbers:
         step = -step if z[k] + step > unknown.upper else step
         moved = z.copy()
         moved[k] += step
-        columns.append((np.asarray(estimator.values(moved)) - base) / step)
+        columns.append((estimator.values(moved) - base) / step)
     return np.column_stack(columns)
 
 
@@ -82,7 +80,7 @@ def judge_numbers(
         np.sqrt(np.maximum(np.diag(each), 0.0)) for each in (covariance, matrix @ learned.prior @ matrix.T)
     )
     size = sizes_of(numbers, noise)
-    columns = _columns(structure, estimator)
+    columns, unknowns = _columns(structure, estimator), estimator.unknowns
     representatives = _representatives(numbers, columns, coverage)
     # `error` from all numbers, `error_alone` with all others known
     chosen = covariance[np.ix_(representatives, representatives)]
@@ -109,7 +107,7 @@ def judge_numbers(
                 number=number,
                 start=given.value,
                 standard_error=float(error[k]),
-                at_bound=_bound(estimator.unknowns[columns[k]], float(z[columns[k]])),
+                at_bound=_bound(unknowns[columns[k]], float(z[columns[k]])),
                 cause=cause,
                 reason=CAUSES[kept] if cause == "kept" else verdict.reason if cause else "",
                 advice=_advice(cause, verdict, cover, finger) if cause not in ("", "kept") else "",
@@ -118,21 +116,21 @@ def judge_numbers(
     return judged, covariance
 
 
-def number_slopes(structure: Structure, learned: Learned, finger: Finger) -> tuple[list[Unknown], Numbers]:
+def number_slopes(structure: Structure, learned: Learned, finger: Finger) -> tuple[list[Number], Numbers]:
     """Return the estimated numbers of a fitted finger, and [p, u] their derivatives by the unknowns."""
-    numbers = values_of(structure, finger)
+    numbers = numbers_in(finger, structure.numbers)
     matrix = slopes(learned.estimator, learned.z)
     return numbers, matrix[[structure.index[number.path] for number in numbers]]
 
 
-def sizes_of(numbers: Sequence[Unknown], noise: float) -> Numbers:
+def sizes_of(numbers: Sequence[Number], noise: float) -> Numbers:
     """Return [p] what a standard error is relative to: the value, or for a bias at least the noise."""
     return np.array([max(abs(each.value), noise if each.path.startswith("bias.") else 1e-300) for each in numbers])
 
 
 def with_known_numbers(finger: Finger, recordings: Sequence[FitRecording]) -> Finger:
     """Return a fitted finger with `estimated`: what these recordings tell of its numbers."""
-    if not unknowns(finger.data):
+    if not friction_numbers(finger.data):
         return finger
     structure = build_structure(finger, Choice())
     return with_learned_numbers(structure, learned_at(structure, recordings), finger)
@@ -145,7 +143,7 @@ def with_learned_numbers(structure: Structure, learned: Learned, finger: Finger)
     return with_estimates(finger, numbers, matrix @ learned.covariance @ matrix.T, sizes_of(numbers, noise))
 
 
-def _bound(unknown: FittedUnknown, value: float) -> str | None:
+def _bound(unknown: Unknown, value: float) -> str | None:
     room = _AT_BOUND * unknown.scale
     if value <= unknown.lower + 1e-3 * room:
         return "lower"
@@ -165,7 +163,7 @@ def _columns(structure: Structure, estimator: Estimator) -> list[int]:
 
 
 def _representatives(
-    numbers: Sequence[Unknown], columns: Sequence[int], coverage: Sequence[EffectCoverage]
+    numbers: Sequence[Number], columns: Sequence[int], coverage: Sequence[EffectCoverage]
 ) -> list[int]:
     """Return [unknowns] a number that represents all that share its value, if possible one that the motion visits."""
     by_path = {cover.effect.path: cover for cover in coverage}
@@ -218,8 +216,4 @@ def _more(verdict: Verdict, cover: EffectCoverage | None, pulls: bool) -> str:
 
 
 def _stribeck(verdict: Verdict) -> float:
-    effect, number = verdict.number.effect, verdict.number
-    if effect is None:
-        return 0.0
-    law = effect.laws[number.point]
-    return float(law.get(number.path.split(".")[-2], law)["stribeck_velocity"])
+    return 0.0 if verdict.number.effect is None else float(verdict.number.side["stribeck_velocity"])

@@ -18,7 +18,7 @@ from tendonfmu import estimate
 from tendonfmu.arrays import Data, Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.excite.excitation import SLOW, Excitation, Plan, Stroke, Variation, plan_excitation
-from tendonfmu.model import Finger, balanced_forces, pretension_vector, read_finger
+from tendonfmu.model import Finger, balanced_forces, friction_numbers, pretension_vector, read_finger
 from tendonfmu.options import ExciteOptions
 from tendonfmu.simulate import finger_with_limits, is_rig
 
@@ -203,7 +203,7 @@ def excite(
 ) -> ExciteResult:
     """Plan the motion and judge it."""
     # ranges: [n]
-    data = subject.finger.data
+    finger, data = subject.finger, subject.finger.data
     motion = plan_excitation(data, plan)
     every = max(1, round(plan.rate / ANALYSIS_RATE))
     samples = {
@@ -211,9 +211,9 @@ def excite(
         "joint_position": motion.joint_position[::every],
         "joint_velocity": motion.joint_velocity[::every],
     }
-    force = balanced_forces(data, samples, motion.tension[::every])
-    numbers, noise = estimate.unknowns(data), estimate.noise_of(data, 1 / plan.rate)
-    parts = estimate.sensitivities(data, numbers, {**samples, "tendon_force": force}, progress)
+    force = balanced_forces(finger, samples, motion.tension[::every])
+    numbers, noise = friction_numbers(data), estimate.noise_of(data, 1 / plan.rate)
+    parts = estimate.sensitivities(finger, numbers, {**samples, "tendon_force": force}, progress)
     known = estimate.information(parts, samples["time"], np.abs(force).mean(axis=1), noise)
     coverage = estimate.coverage_of(data, motion.joint_position, motion.joint_velocity, estimate.durations(motion.time))
     pulls = np.array([not tendon.get("bidirectional") for tendon in data["tendons"]])

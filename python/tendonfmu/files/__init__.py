@@ -34,6 +34,7 @@ if TYPE_CHECKING:
         is_about,
         path_of,
         whole_file,
+        write_bytes,
         write_text,
     )
 

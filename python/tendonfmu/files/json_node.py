@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Collection, Mapping
+from dataclasses import is_dataclass
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar, cast
 
@@ -91,9 +92,11 @@ def shown(value: Any) -> str:
 
 
 def finite(value: T) -> T:
-    """Replace every number that is not finite by None."""
+    """Replace every number that is not finite by None; an object of a dataclass becomes what JSON has of it."""
     made: Any = value
-    if isinstance(value, float):
+    if is_dataclass(value):
+        made = finite(vars(value))
+    elif isinstance(value, float):
         made = value if math.isfinite(value) else None
     elif isinstance(value, Mapping):
         made = {key: finite(inner) for key, inner in value.items()}

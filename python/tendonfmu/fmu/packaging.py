@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
 from tendonfmu.errors import InputError, InternalError
-from tendonfmu.files import html_template, whole_file
+from tendonfmu.files import html_template, write_bytes
 from tendonfmu.fmu.model_variables import VariableTable, describe_model, group_sizes, in_arrays, read_table
 from tendonfmu.model import Finger, FingerSource, count, native, read_finger
 
@@ -87,17 +87,8 @@ def build_fmu(
     experiment: Mapping[str, float] | None = None,
 ) -> Path:
     """Package the FMU of a finger description. at_end: a step takes the sample at its end; experiment: (s)."""
-    content = members(
-        read_finger(finger),
-        binaries=binaries,
-        fmi=fmi,
-        at_end=at_end,
-        experiment=experiment,
-    )
-    archive = pack(content | dict(extra or {}))
-    with whole_file(output_path) as file:
-        file.write_bytes(archive)
-    return output_path
+    content = members(read_finger(finger), binaries=binaries, fmi=fmi, at_end=at_end, experiment=experiment)
+    return write_bytes(output_path, pack(content | dict(extra or {})))
 
 
 def model_identifier(name: str) -> str:
@@ -169,7 +160,12 @@ def illustrations(finger: Finger, template: str, model: Mapping[str, Any], **con
         for causality in ("input", "output", "parameter")
     }
     drawing = finger_drawing(finger.data)
-    routing = {"drawing": finger_svg(drawing), "keys": list(keys_of(drawing)), "summary": count(finger)}
+    routing = {
+        "drawing": finger_svg(drawing),
+        "keys": list(keys_of(drawing)),
+        "summary": count(finger),
+        "finger": finger,
+    }
     page = html_template(template).render(model=model, **by_causality, **routing, **context)
     icon = draw_finger(drawing)
     files = {"model.png": icon, "documentation/index.html": page.encode()}
@@ -316,9 +312,7 @@ def write_c_array(finger: Finger, output: Path) -> Path:
         size=len(image),
         rows="\n".join(f"    {''.join(f'{byte},' for byte in line)}" for line in lines),
     )
-    with whole_file(output) as file:
-        file.write_text(text, encoding="ascii", newline="\n")
-    return output
+    return write_bytes(output, text.encode("ascii"))
 
 
 def c_array_report(source: Path, finger: Finger, output: Path) -> dict[str, Any]:

@@ -28,6 +28,13 @@ from tendonfmu.recordings import Recording
 
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
 NOTE = "documentation/fmi-ls-ref.txt"
+EXPERIMENTS = "application/x-ma-hs-experiments"
+DESCRIPTIONS = {
+    ".exp": "The run that gave the reference results",
+    "_in.csv": "Inputs of the reference results",
+    "_ref.csv": "Reference results: all outputs",
+    "_ref.opt": "Step and tolerance of the comparison, in the form of the FMI cross-check",
+}
 VERSION = "1.0.0-beta.1"  # of fmi-ls-ref
 
 # The agreement that the semantics ask of two implementations (docs/reference/semantics/README.md).
@@ -82,35 +89,16 @@ def reference_run(finger: Finger, recording: Recording, *, arrays: bool = False,
     name = model_identifier(finger.name)
     experiment = {"start": 0.0, "stop": float(grid.time[-1]), "step": step}
     inputs: Table = {"time": grid.time, **grid.groups}
+    of_end = "; a step takes the sample at its end" * at_end
+    made = (
+        (".exp", _experiments(name, experiment, recording.path.name), "experiment/smoke-test", EXPERIMENTS),
+        ("_in.csv", _csv(inputs if arrays else columns_of(inputs)), "testcase", "text/csv"),
+        ("_ref.csv", _csv(reference if arrays else columns_of(reference)), "result", "text/csv"),
+        ("_ref.opt", _options(experiment), "configuration", "text/csv"),
+    )
     files = [
-        Related(
-            f"{name}.exp",
-            _experiments(name, experiment, recording.path.name),
-            "experiment/smoke-test",
-            "application/x-ma-hs-experiments",
-            "The run that gave the reference results",
-        ),
-        Related(
-            f"{name}_in.csv",
-            _csv(inputs if arrays else columns_of(inputs)),
-            "testcase",
-            "text/csv",
-            "Inputs of the reference results",
-        ),
-        Related(
-            f"{name}_ref.csv",
-            _csv(reference if arrays else columns_of(reference)),
-            "result",
-            "text/csv",
-            "Reference results: all outputs" + "; a step takes the sample at its end" * at_end,
-        ),
-        Related(
-            f"{name}_ref.opt",
-            _options(experiment),
-            "configuration",
-            "text/csv",
-            "Step and tolerance of the comparison, in the form of the FMI cross-check",
-        ),
+        Related(f"{name}{end}", content, role, kind, DESCRIPTIONS[end] + of_end * (role == "result"))
+        for end, content, role, kind in made
     ]
     return ReferenceRun(files, experiment)
 

@@ -27,7 +27,7 @@ from lxml import etree
 from lxml.builder import ElementMaker
 
 from tendonfmu.errors import InputError
-from tendonfmu.files import check_output, counted, whole_file
+from tendonfmu.files import check_output, counted, write_bytes
 from tendonfmu.fmu.model_variables import NOT_IN_XML, read_table
 from tendonfmu.fmu.packaging import package_file
 from tendonfmu.fmu.reference_results import Related
@@ -114,9 +114,7 @@ def write_parameter_set(
     path: Path, name: str, parameters: Sequence[SetParameter], finger: Finger, *, warnings: Sequence[str] = ()
 ) -> Path:
     """Write a parameter set, whole or not at all."""
-    with whole_file(path) as file:
-        file.write_bytes(_parameter_set(name, parameters, finger, warnings))
-    return path
+    return write_bytes(path, _parameter_set(name, parameters, finger, warnings))
 
 
 def _parameter_set(name: str, parameters: Sequence[SetParameter], finger: Finger, warnings: Sequence[str]) -> bytes:

@@ -1,8 +1,8 @@
 """What a finger is: its description and the compiled model.
 
 `description` reads a finger description. `native` is the binding of the C runtime; every call of the model goes through
-it. Other modules hold the places of friction and quasi-static balance (`friction_places`), extensions, the geometry of
-the routing, and checks for implausible but valid descriptions (`plausibility`).
+it. Other modules hold the places of friction (`friction_places`), quasi-static balance (`balance`), extensions, the
+geometry of the routing, and checks for implausible but valid descriptions (`plausibility`).
 """
 
 from typing import TYPE_CHECKING
@@ -11,15 +11,17 @@ from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from . import native
+    from .balance import balanced_forces, friction_probe, pretension_vector
     from .description import (
         Finger,
         FingerSource,
-        Law,
         count,
         description_text,
         finger_file,
         finger_from_data,
         finger_from_text,
+        finger_of,
+        laws,
         read_finger,
         sides,
         starting_finger,
@@ -28,13 +30,13 @@ if TYPE_CHECKING:
         DEFAULTS,
         DETECTING,
         EFFECT_NUMBERS,
+        LAW_NUMBERS,
         LEFT_OUT,
         LIMITS,
-        MAGNITUDES,
         RANGES,
+        Law,
         bias_is_constant,
         extended_row,
-        extension_numbers,
         extension_rows,
         get_number,
         law_path,
@@ -48,16 +50,15 @@ if TYPE_CHECKING:
     )
     from .friction_places import (
         Effect,
-        balanced_forces,
+        Number,
         effects,
-        friction_probe,
+        estimable_numbers,
+        friction_numbers,
         moment_arms,
-        pretension_vector,
         sliding_velocity,
         tendon_positions,
         velocity_threshold,
         without_friction,
-        without_learning,
         working_point_weights,
     )
     from .native import Instance, NativeError

@@ -11,7 +11,7 @@ import os
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,8 @@ from typing import Any
 from tendonfmu.errors import InputError
 from tendonfmu.files import counted, path_of, write_text
 from tendonfmu.model import native
-from tendonfmu.model.description_numbers import extension_numbers, extension_rows, with_values_at, without_detection
+from tendonfmu.model.description_numbers import Law, extension_rows, own_copy, with_values_at, without_detection
+from tendonfmu.model.friction_places import estimable_numbers
 from tendonfmu.model.routing_geometry import finger_html
 
 IN_MEMORY = Path("finger")  # stands for the file of a finger that was read from none
@@ -32,13 +33,15 @@ _OTHER_FORMATS = {
     "tendonfmu-score-": "report of a score",
     "tendonfmu-excitation-": "report of a plan",
 }
+KINDS = ("friction", "load_friction", "pulley_friction", "edge_friction")  # of laws
 _WIDTH = 160  # longest line of JSON that is not broken: a law with all digits fits
-Law = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
 class Finger:
     """A finger: a description that the native reader has accepted. It cannot be changed; `replace` makes another one.
+
+    What is compiled is shared by all fingers that differ in numbers alone.
 
     Attributes
     ----------
@@ -63,17 +66,42 @@ class Finger:
     def image(self) -> bytes:
         """The model image made from the description."""
         with native.refusals_of(self.path):
-            return native.image_from_json(self.text)
+            return native.image_from_json(json.dumps(self.data))
 
     @cached_property
     def numbers(self) -> Mapping[str, native.Parameter]:
         """All numbers of the finger by path, in the order of the FMU's parameters, with unit and range."""
+        if self._changed:
+            known = self._compiled.numbers
+            return {**known, **{path: replace(known[path], start=value) for path, value in self._changed.items()}}
         return {each.path: each for each in native.Instance(self.image).parameters()}
+
+    @cached_property
+    def _compiled(self) -> Finger:
+        """The finger whose image this one shares."""
+        return self
+
+    @cached_property
+    def _changed(self) -> dict[str, float]:
+        """The numbers that differ from that image, by path."""
+        return {}
+
+    def instance(self, kinematics_source: int = 1) -> native.Instance:
+        """Make a finger that runs."""
+        finger = native.Instance(self._compiled.image, kinematics_source)
+        finger.set(self._changed)
+        return finger
 
     @cached_property
     def model(self) -> Finger:
         """The friction model alone: the finger without its detector, and without how well its numbers are known."""
         return self.with_data(without_detection(self.data))
+
+    @cached_property
+    def steady(self) -> Finger:
+        """The friction model whose bias neither learns nor forgets."""
+        bias = {"drift_variance": 0.0, "initial_variance": 0.0, "initial_torque": [0.0] * self.joints}
+        return self.with_data({**without_detection(self.data), "bias": {**bias, "forget_rate": 0.0}})
 
     def __repr__(self) -> str:
         return f"<Finger {self.name}: {counted(self.joints, 'joint')}, {counted(self.tendons, 'tendon')}>"
@@ -110,8 +138,7 @@ class Finger:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the description as a dictionary of its own, in the form of the JSON file."""
-        copied: dict[str, Any] = json.loads(self.text)
-        return copied
+        return own_copy(self.data)
 
     def numbered(self, path: str) -> str:
         """Return a path with numbers in place of the names of tendons and joints: `tendons[FDP].stiffness`."""
@@ -124,7 +151,7 @@ class Finger:
         return re.sub(r"\[([^\[\]]*)\]", number, path)
 
     def replace(self, values: Mapping[str, Any]) -> Finger:
-        """Return a finger with other values.
+        """Return a finger with other values. If all are numbers that this one has, nothing is compiled anew.
 
         Parameters
         ----------
@@ -145,10 +172,17 @@ class Finger:
         """
         try:
             named = {self.numbered(path) if isinstance(path, str) else path: value for path, value in values.items()}
-            data = with_values_at(self.to_dict(), _plain(named), self.numbers)
+            plain = _plain(named)
+            data = with_values_at(own_copy(self.data), plain, self.numbers)
         except InputError as refused:
             raise InputError(f"{self.path}: {refused}") from None
-        return self.with_data(data)
+        if not all(path in self.numbers and type(value) in (int, float) for path, value in plain.items()):
+            return self.with_data(data)
+        changed = Finger(self.path, data)
+        vars(changed).update(_compiled=self._compiled, _changed={**self._changed, **plain})
+        with native.refusals_of(self.path):
+            changed.instance()
+        return changed
 
     def with_data(self, data: Mapping[str, Any]) -> Finger:
         """Return the finger with another description, checked by the core; itself if it is the same."""
@@ -177,7 +211,7 @@ class Finger:
         list of str
             One line each for joints, tendons, moment arms, stiffness, friction and numbers.
         """
-        return _summary_lines(count(self))
+        return _summary_lines(self, count(self))
 
     def _repr_html_(self) -> str:
         return finger_html(self.summary(), self.data)
@@ -190,9 +224,6 @@ FingerSource = Finger | Mapping[str, Any] | str | os.PathLike[str]
 class Counts:
     """What a finger has, in numbers."""
 
-    name: str
-    joint_names: list[str]
-    tendon_names: list[str]
     bidirectional_tendons: int
     moment_arms: tuple[float, float]  # least and largest magnitude (m; N/m), without moment arms of 0
     stiffness: tuple[float, float]
@@ -207,14 +238,6 @@ class Counts:
     tunable_parameters: int
     # counts of the numbers that a fit estimates, biases included (see `estimated_numbers()`)
     estimated_numbers: dict[str, int]
-
-    @property
-    def joints(self) -> int:
-        return len(self.joint_names)
-
-    @property
-    def tendons(self) -> int:
-        return len(self.tendon_names)
 
 
 def read_finger(source: FingerSource) -> Finger:
@@ -264,9 +287,16 @@ def finger_file(source: object) -> Path:
     return path_of(source)
 
 
+def finger_of(data: Mapping[str, Any]) -> Finger:
+    """Return the finger of a valid description; it is compiled when it is needed."""
+    return Finger(IN_MEMORY, data)
+
+
 def finger_from_data(data: Mapping[str, Any], path: Path = IN_MEMORY) -> Finger:
     """Make a finger from parsed JSON."""
-    return finger_from_text(path, description_text(data).encode())
+    finger = finger_from_text(path, json.dumps(data).encode())
+    del vars(finger)["text"]  # it is not as `write` writes it
+    return finger
 
 
 def finger_from_text(path: Path, text: bytes) -> Finger:
@@ -275,7 +305,7 @@ def finger_from_text(path: Path, text: bytes) -> Finger:
     with native.refusals_of(path):
         image = native.image_from_json(text)
     finger = Finger(path, json.loads(text))
-    vars(finger).update(text=text, image=image)  # `replace` makes a finger without them
+    vars(finger).update(text=text, image=image)
     return finger
 
 
@@ -352,41 +382,32 @@ def _check_format(path: Path, text: bytes) -> None:
                 raise InputError(f'{path}: format = "{given}": {what}; expected a finger description, "{FORMAT}"')
 
 
-def laws(data: Mapping[str, Any]) -> Iterator[tuple[str, Law]]:
-    """Yield (kind, law) of every law of a valid description. Each working point is a separate law; kind is its key."""
-    for joint in data["joints"]:
+def laws(data: Mapping[str, Any]) -> Iterator[tuple[str, str, Law]]:
+    """Yield (path, kind, law) of every law of a valid description. Each working point is a separate law."""
+    for j, joint in enumerate(data["joints"], start=1):
         for kind in ("friction", "load_friction"):
             if joint.get(kind) is not None:
-                yield kind, joint[kind]
-    for tendon in data["tendons"]:
-        for law in tendon.get("pulley_friction") or []:
-            if law is not None:
-                yield "pulley_friction", law
-        for edge in tendon.get("edge_friction") or []:
-            if edge is not None:
-                for law in edge.get("laws") or [edge]:
-                    yield "edge_friction", law
+                yield f"joints[{j}].{kind}", kind, joint[kind]
+    for i, tendon in enumerate(data["tendons"], start=1):
+        for kind in ("pulley_friction", "edge_friction"):
+            for j, entry in enumerate(tendon.get(kind) or [], start=1):
+                path, points = f"tendons[{i}].{kind}[{j}]", [] if entry is None else entry.get("laws") or []
+                yield from ((f"{path}.laws[{k}]", kind, law) for k, law in enumerate(points, start=1))
+                if entry is not None and not points:
+                    yield path, kind, entry
 
 
 def estimated_numbers(data: Mapping[str, Any]) -> dict[str, int]:
     """Count the numbers that a fit estimates, by kind."""
-    counts = dict.fromkeys(("friction", "load_friction", "pulley_friction", "edge_friction"), 0)
-    for kind, law in laws(data):
-        counts[kind] += sum(_numbers_of_side(side) for side in sides(law))
-    counts["cover"] = sum(1 for joint in data["joints"] if (joint.get("cover") or {}).get("stiffness"))
-    counts["extensions"] = sum(1 for _ in extension_numbers(data))
-    counts["bias"] = len(data["joints"])
-    return counts
+    counts = dict.fromkeys((*KINDS, "cover", "extensions", "bias"), 0)
+    for number in estimable_numbers(data):
+        counts[number.kind.partition(".")[0]] += 1
+    return counts | {"bias": len(data["joints"])}
 
 
 def sides(law: Law) -> list[Law]:
     """Return the sides of a law."""
     return [law] if law.get("positive") is None else [law["positive"], law["negative"]]
-
-
-def _numbers_of_side(side: Law) -> int:
-    stribeck = 2 if side["static"] != side["coulomb"] else 0
-    return 1 + stribeck + (1 if side.get("viscous") else 0)
 
 
 def _entries(data: Mapping[str, Any], key: str) -> list[Any]:
@@ -403,19 +424,15 @@ def count(description: Finger) -> Counts:
     data = description.data
     present = list(laws(data))
     edges = _entries(data, "edge_friction")
-    kinds = ("friction", "load_friction", "pulley_friction", "edge_friction")
     return Counts(
-        name=description.name,
-        joint_names=description.joint_names,
-        tendon_names=description.tendon_names,
         bidirectional_tendons=sum(1 for tendon in data["tendons"] if tendon.get("bidirectional")),
         moment_arms=_range(abs(arm) for row in description.moment_arms for arm in row if arm),
         stiffness=_range(float(tendon["stiffness"]) for tendon in data["tendons"]),
         pulleys=len(_entries(data, "pulley_friction")),
         edges=len(edges),
         working_points=sum(len(edge.get("angles") or []) for edge in edges),
-        laws={kind: sum(1 for k, _ in present if k == kind) for kind in kinds},
-        asymmetric_laws=sum(1 for _, law in present if len(sides(law)) == 2),
+        laws={kind: sum(1 for _, k, _ in present if k == kind) for kind in KINDS},
+        asymmetric_laws=sum(1 for _, _, law in present if len(sides(law)) == 2),
         covers=sum(1 for joint in data["joints"] if joint.get("cover") is not None),
         extensions=[row["effect"] for row in extension_rows(data)],
         parameters=len(description.numbers),
@@ -424,15 +441,15 @@ def count(description: Finger) -> Counts:
     )
 
 
-def _summary_lines(counts: Counts) -> list[str]:
+def _summary_lines(finger: Finger, counts: Counts) -> list[str]:
     laws = ", ".join(f"{number} {kind}" for kind, number in counts.laws.items() if number) or "none"
     estimated = ", ".join(f"{number} {kind}" for kind, number in counts.estimated_numbers.items() if number)
     loops = f", {counts.bidirectional_tendons} of them cable loops" if counts.bidirectional_tendons else ""
     asymmetric = f"; {counts.asymmetric_laws} of them asymmetric" if counts.asymmetric_laws else ""
     lines = [
-        f"{counts.name}: a valid finger description",
-        f"joints             {counts.joints}: {', '.join(counts.joint_names)}",
-        f"tendons            {counts.tendons}: {', '.join(counts.tendon_names)}{loops}",
+        f"{finger.name}: a valid finger description",
+        f"joints             {finger.joints}: {', '.join(finger.joint_names)}",
+        f"tendons            {finger.tendons}: {', '.join(finger.tendon_names)}{loops}",
         f"moment arms        {1e3 * counts.moment_arms[0]:.4g} to {1e3 * counts.moment_arms[1]:.4g} mm",
         f"stiffness          {counts.stiffness[0]:.4g} to {counts.stiffness[1]:.4g} N/m",
         f"pulleys, edges     {counts.pulleys}, {counts.edges} with {counted(counts.working_points, 'working point')}",

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from itertools import count, takewhile
@@ -28,7 +28,11 @@ class EffectNumber:
     least: float  # its range
     most: float
     missing: float | None  # its value where it is left out; None if it is required
-    scale: float  # its expected magnitude
+    scale: float  # magnitude that matters on a hand of human size
+
+
+Law = Mapping[str, Any]
+LAW_NUMBERS = ("static", "coulomb", "stribeck_velocity", "viscous")  # of a law, or of each of its sides
 
 
 DEFAULTS: Mapping[str, float] = _TABLE["defaults"]  # by path
@@ -42,41 +46,15 @@ EFFECT_NUMBERS: Mapping[str, Mapping[str, EffectNumber]] = {
     for effect, numbers in _TABLE["effects"].items()
 }
 
-# By effect, in the order of the FMU's parameters: magnitudes that matter on a hand of human size, SI units.
-MAGNITUDES: Mapping[str, Mapping[str, float]] = {
-    effect: {name: number.scale for name, number in numbers.items()} for effect, numbers in EFFECT_NUMBERS.items()
-}
-
 # What is taken where the description leaves a number out, if not 0. As long as it is that, a fit leaves it alone.
 LEFT_OUT: Mapping[str, float] = {
     name: number.missing for numbers in EFFECT_NUMBERS.values() for name, number in numbers.items() if number.missing
 }
 
 
-@dataclass(frozen=True)
-class ExtensionNumber:
-    """A number of an extension."""
-
-    effect: str  # effect of the extension
-    path: str  # path as in the description
-    value: float  # in SI units
-    magnitude: float  # expected size of such a number
-    left_out: bool = False  # whether the description leaves it out, or has the value that stands for leaving it out
-
-
 def extension_rows(data: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     """Return the extensions of a description."""
     return list(data.get("extensions") or [])
-
-
-def extension_numbers(data: Mapping[str, Any]) -> Iterator[ExtensionNumber]:
-    """Yield all numbers of the extensions of a description."""
-    for k, row in enumerate(extension_rows(data), start=1):
-        for name, magnitude in MAGNITUDES[row["effect"]].items():
-            missing = LEFT_OUT.get(name, 0.0)
-            value = missing if row.get(name) is None else float(row[name])
-            left_out = value == missing and (missing != 0.0 or row["effect"] == "presliding")
-            yield ExtensionNumber(row["effect"], f"extensions[{k}].{name}", value, magnitude, left_out)
 
 
 def place_of(row: Mapping[str, Any]) -> str:
@@ -118,8 +96,8 @@ def get_number(data: Any, path: str) -> Any:
     return data
 
 
-def set_number(data: Any, path: str, value: float) -> None:
-    """Set a number of a parsed description in place."""
+def set_number(data: Any, path: str, value: Any) -> None:
+    """Set a number, or another part, of a parsed description in place."""
     *way, last = steps_of(path)
     for step in way:
         data = data[step]

@@ -1,8 +1,4 @@
-"""Where a finger has friction, and which tendon forces carry it.
-
-Each effect has its place, the motion that drives it, and its numbers. In quasi-static balance Rᵀ f0 = T (eq. 12): the
-forces are a pretension that balances itself, and what carries the friction of a motion.
-"""
+"""Where a finger has friction: the place of each effect, what drives it, and its numbers."""
 
 from __future__ import annotations
 
@@ -13,14 +9,7 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.arrays import Numbers
-from tendonfmu.errors import InputError
-from tendonfmu.model import native
-from tendonfmu.model.description import Law
-from tendonfmu.model.description_numbers import number_of, without_detection
-
-LEAST_SHARE = 0.05  # of the mean; keeps every pulling tendon taut
-_SWEEPS = 20000
-_ITERATIONS = 8  # each reduces the error to the share of the force that friction takes, some percent
+from tendonfmu.model.description_numbers import EFFECT_NUMBERS, Law, extension_rows, number_of
 
 
 @dataclass(frozen=True)
@@ -88,7 +77,98 @@ def working_point_weights(effect: Effect, joint_position: Numbers) -> Numbers:
     return np.column_stack([np.interp(angle, effect.angles, row) for row in unit])
 
 
-# --- forces in balance ------------------------------------------------------------------------------------------------
+# --- numbers ----------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number of the description that a fit estimates."""
+
+    path: str  # path in the description
+    value: float  # value in SI units
+    effect: Effect | None = None  # friction effect that the number belongs to, if any
+    point: int = 0  # which of the laws of the effect, from 0
+    with_path: str | None = None  # number that moves by the same amount (static where it equals coulomb), if any
+    extension: str | None = None  # name of the effect in `extensions` that the number belongs to, if any
+    size: float = 1.0  # expected magnitude, where the value may be 0
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Paths of all that moves with it."""
+        return (self.path,) if self.with_path is None else (self.path, self.with_path)
+
+    @property
+    def kind(self) -> str:
+        """What the number belongs to: edge_friction, cover, bias, extensions.gravity."""
+        if self.effect is not None:
+            return self.effect.kind
+        if self.extension is not None:
+            return f"extensions.{self.extension}"
+        return self.path.rsplit(".", 1)[0].rsplit(".", 1)[-1].split("[")[0]
+
+    @property
+    def key(self) -> str:
+        """Last part of the path: static, coulomb, stribeck_velocity, viscous, stiffness."""
+        return self.path.rsplit(".", 1)[1]
+
+    @property
+    def side(self) -> Law:
+        """The side of the law that the number belongs to."""
+        assert self.effect is not None
+        law = self.effect.laws[self.point]
+        side: Law = law.get(self.path.split(".")[-2], law)
+        return side
+
+    @property
+    def reference(self) -> float:
+        """Size that steps and errors are relative to: the value, or if that is 0 the static friction of its law."""
+        if self.value or self.effect is None:
+            return abs(self.value) or self.size
+        return float(self.side["static"]) or 1.0
+
+
+def friction_numbers(data: Mapping[str, Any]) -> list[Number]:
+    """List the numbers that a fit estimates, without the biases, which are tracked."""
+    numbers = [number for effect in effects(data) for number in _numbers_of(effect)]
+    for j, joint in enumerate(data["joints"], start=1):
+        stiffness = (joint.get("cover") or {}).get("stiffness")
+        if stiffness:
+            numbers.append(Number(f"joints[{j}].cover.stiffness", float(stiffness)))
+    return [*numbers, *_of_extensions(data)]
+
+
+def estimable_numbers(data: Mapping[str, Any]) -> list[Number]:
+    """List the numbers that a fit of a parsed description may estimate: all present, `bias.initial_torque` last."""
+    given = (data.get("bias") or {}).get("initial_torque") or []
+    biases = (Number(f"bias.initial_torque[{j}]", float(value)) for j, value in enumerate(given, start=1))
+    return [*friction_numbers(data), *biases]
+
+
+def _numbers_of(effect: Effect) -> Iterator[Number]:
+    for point, (path, law) in enumerate(zip(effect.law_paths, effect.laws, strict=True)):
+        asymmetric = law.get("positive") is not None
+        for side in ("positive", "negative") if asymmetric else ("",):
+            values, prefix = (law[side], f"{path}.{side}") if side else (law, path)
+            stribeck = values["static"] != values["coulomb"]
+            tied = None if stribeck else f"{prefix}.static"
+            yield Number(f"{prefix}.coulomb", float(values["coulomb"]), effect, point, tied)
+            for key in ("static", "stribeck_velocity") if stribeck else ():
+                yield Number(f"{prefix}.{key}", float(values[key]), effect, point)
+            if values.get("viscous"):
+                yield Number(f"{prefix}.viscous", float(values["viscous"]), effect, point)
+
+
+def _of_extensions(data: Mapping[str, Any]) -> Iterator[Number]:
+    """Yield the numbers of extensions; one with the value that stands for leaving it out is no number of the finger."""
+    for k, row in enumerate(extension_rows(data), start=1):
+        for name, number in EFFECT_NUMBERS[row["effect"]].items():
+            missing = number.missing or 0.0
+            value = missing if row.get(name) is None else float(row[name])
+            if value != missing or not (missing or row["effect"] == "presliding"):
+                yield Number(f"extensions[{k}].{name}", value, extension=row["effect"], size=number.scale)
+
+
+# --- routing ----------------------------------------------------------------------------------------------------------
 
 
 def moment_arms(data: Mapping[str, Any]) -> Numbers:
@@ -103,66 +183,11 @@ def tendon_positions(data: Mapping[str, Any], angle: Numbers, force: Numbers) ->
     return np.asarray(angle @ moment_arms(data).T + force / stiffness + zero)
 
 
-def pretension_vector(data: Mapping[str, Any]) -> Numbers:
-    """Return the tendon forces [m] per newton of pretension."""
-    arms = moment_arms(data)
-    pulls = np.array([not tendon.get("bidirectional") for tendon in data["tendons"]])
-    project = np.eye(len(arms)) - arms @ np.linalg.pinv(arms)
-    shares = project @ np.ones(len(arms))
-    least = np.where(pulls, LEAST_SHARE, -np.inf)
-    correction = np.zeros(len(arms))
-    for _ in range(_SWEEPS):
-        if np.all(shares >= least * (1 - 1e-9)):
-            break
-        allowed = np.maximum(shares + correction, least)
-        correction += shares - allowed
-        shares = project @ allowed
-    else:
-        raise InputError(
-            "tendons: no balanced pretension; expected moment arms with a solution of "
-            "Rᵀ f = 0 in which every tendon pulls"
-        )
-    mean = float(np.mean(shares))
-    return shares / mean if mean > 1e-9 else np.zeros(len(arms))
-
-
-def without_learning(data: Mapping[str, Any], *kept: str) -> dict[str, Any]:
-    """Return a description without contact detection, whose bias keeps some settings and is moved only by jumps."""
-    bias: dict[str, Any] = {"drift_variance": 0.0, "initial_variance": 0.0}
-    bias["initial_torque"] = [0.0] * len(data["joints"])
-    given = data.get("bias") or {}
-    bias |= {key: given[key] for key in kept if given.get(key) is not None}
-    return {**without_detection(data), "bias": bias}
-
-
-def without_friction(data: Mapping[str, Any], *kept: str) -> dict[str, Any]:
-    """Return a description without friction and covers, but for some keys of its joints and tendons."""
-    gone = {"friction", "load_friction", "cover", "pulley_friction", "edge_friction"} - set(kept)
+def without_friction(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a description without friction and covers."""
+    gone = {"friction", "load_friction", "cover", "pulley_friction", "edge_friction"}
     bare = {
         part: [{key: value for key, value in each.items() if key not in gone} for each in data[part]]
         for part in ("joints", "tendons")
     }
     return {**data, **bare, "extensions": []}
-
-
-def friction_probe(data: Mapping[str, Any]) -> native.Instance:
-    """Make a finger that computes the friction model only."""
-    probe = without_learning(data, "noise_std", "noise_std_per_force", "forget_rate", "noise_time")
-    return native.Instance.from_description(probe, 3)
-
-
-def balanced_forces(data: Mapping[str, Any], motion: Mapping[str, Numbers], pretension: Numbers) -> Numbers:
-    """Return the tendon forces that carry the friction of a motion: f0 = pretension·ν + (Rᵀ)⁺ T(f0)."""
-    # T is eq. (10) of everything that slides, cover included. Sticking places add nothing, since their share is
-    # unknown.
-    # motion: [N] (s); pretension: [N] (N); returns tendon forces [N, m] (N)
-    finger = friction_probe(data)
-    start = finger.save_state()
-    spread = np.linalg.pinv(moment_arms(data))
-    internal = np.outer(pretension, pretension_vector(data)) if pretension.ndim == 1 else pretension
-    forces = internal
-    for _ in range(_ITERATIONS):
-        finger.restore_state(start)
-        outputs = finger.run({**motion, "tendon_force": forces})
-        forces = internal + (outputs["friction_torque"] - outputs["bias_torque"]) @ spread
-    return np.asarray(forces)

@@ -162,7 +162,7 @@ def _covers(data: Mapping[str, Any]) -> Iterator[Row]:
 
 def _laws(data: Mapping[str, Any]) -> Iterator[Row]:
     taking = {"pulley_friction", "edge_friction"}
-    most = [max(abs(side["static"]) for side in sides(law)) for kind, law in laws(data) if kind in taking]
+    most = [max(abs(side["static"]) for side in sides(law)) for _, kind, law in laws(data) if kind in taking]
     if most and max(most) >= ALL_FRICTION:
         seen = f"static friction of {max(most):g} takes all of the tendon's force"
         yield (

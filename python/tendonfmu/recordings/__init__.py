@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from .columns import GROUPS, element_of, right_spelling
+    from .columns import GROUPS, Nis, RecordingEntry, RoutingEntry, Whiteness, element_of, right_spelling
     from .converters import convert_file
     from .converters.column_map import read_log_format
     from .converters.inspection import Inspection, inspect_log
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
         unused_line,
     )
     from .converters.table import Conversion, convert_table
-    from .entry_types import Nis, RecordingEntry, RoutingEntry, Whiteness
     from .faults import gaps, tendon_angles
     from .findings import check_report, recording_report, refusal_report, routing_entry, varying_sentences
     from .match import UNFIT_FOR_SEARCH, admit, belongs

@@ -10,8 +10,8 @@ from typing import Any
 
 from tendonfmu.files import counted, percent
 from tendonfmu.model import Finding, Finger
+from tendonfmu.recordings.columns import LearnedNumber, RoutingEntry
 from tendonfmu.recordings.converters import units
-from tendonfmu.recordings.entry_types import LearnedNumber, RoutingEntry
 from tendonfmu.recordings.faults import Fault
 from tendonfmu.recordings.kinematics import Correction
 from tendonfmu.recordings.recording import GROUPS, Recording

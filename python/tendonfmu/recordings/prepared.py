@@ -25,7 +25,7 @@ from tendonfmu.model import (
     velocity_threshold,
     watches_motors,
 )
-from tendonfmu.recordings.entry_types import RecordingEntry
+from tendonfmu.recordings.columns import RecordingEntry
 from tendonfmu.recordings.faults import SETTLING, gap_sentences, gaps, rate_sentences, silent_tendons, stuck_sensors
 from tendonfmu.recordings.recording import Recording, check_numbers
 from tendonfmu.recordings.residuals import Model, run_parts
@@ -105,9 +105,9 @@ class FitRecording:
         """Return the recording with other signals of some groups."""
         return replace(self, recording=replace(self.recording, groups={**self.recording.groups, **groups}))
 
-    def run(self, data: Mapping[str, Any]) -> Model:
+    def run(self, finger: Finger) -> Model:
         """Run a finger over the recording; its bias learns from the tracked samples."""
-        model = run_parts(data, self.recording.arrays(), self.parts, self.tracked, self.kinematics)
+        model = run_parts(finger, self.recording.arrays(), self.parts, self.tracked, self.kinematics)
         residual, variance = (np.where(self.silent, np.nan, each) for each in (model.residual, model.variance))
         return replace(model, residual=residual, variance=variance)
 
@@ -164,7 +164,7 @@ def prepare(finger: Finger, recording: Recording, kinematics: int, held: Held) -
         faulty=faulty,
         silent=np.zeros((len(recording), joints), dtype=bool),
         parts=parts,
-        model=run_parts(finger.data, recording.arrays(), parts, usable, kinematics),
+        model=run_parts(finger, recording.arrays(), parts, usable, kinematics),
         warnings=[*warnings, *sentences],
     )
 
@@ -181,7 +181,7 @@ def without_rests(recording: FitRecording, finger: Finger, is_batch: bool) -> Fi
         parts = [slice(part.start + int(np.argmin(rests[part])), part.stop) for part in parts if not rests[part].all()]
     _refuse_too_little(recording.recording, parts, train | held_out, recording.contact_out)
     left = replace(recording, train=train, held_out=held_out, silent=silent, parts=parts)
-    return replace(left, model=left.run(finger.data))
+    return replace(left, model=left.run(finger))
 
 
 def left_at_rest(data: Mapping[str, Any], joint_velocity: Numbers) -> Flags:

@@ -8,14 +8,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.special import chdtrc, gammaincinv
 
-from tendonfmu.arrays import Flags, Numbers
-from tendonfmu.model import native, without_detection
-from tendonfmu.recordings.entry_types import Nis, Whiteness
+from tendonfmu.arrays import Data, Flags, Numbers
+from tendonfmu.model import Finger, moment_arms
+from tendonfmu.recordings.columns import Nis, Whiteness
 
 LAGS = 20  # of the Ljung-Box test
 CONFIDENCE = 0.95
@@ -39,35 +38,34 @@ class Model:
 
 
 def run_parts(
-    data: Mapping[str, Any], arrays: Mapping[str, Numbers], parts: Sequence[slice], learns: Flags, source: int
+    finger: Finger, arrays: Mapping[str, Numbers], parts: Sequence[slice], learns: Flags, source: int
 ) -> Model:
     """Run a finger over the parts of a recording, less its known torque; the bias learns from some samples [N]."""
-    joints, tendons, samples = len(data["joints"]), len(data["tendons"]), len(learns)
-    finger = native.Instance.from_description(without_detection(data), source)
-    start = finger.save_state()
-    torque, angle, speed, residual, variance = (np.full((samples, joints), np.nan) for _ in range(5))
-    slack = np.zeros((samples, tendons), dtype=bool)
+    running = finger.model.instance(source)
+    start = running.save_state()
+    torque, angle, speed, residual, variance = (np.full((len(learns), finger.joints), np.nan) for _ in range(5))
+    slack = np.zeros((len(learns), finger.tendons), dtype=bool)
     for part in parts:
         given = {name: values[part] for name, values in arrays.items()}
         known = given.get("external_torque")
-        finger.restore_state(start)
-        outputs = finger.run_guided(given, learns[part], known)
+        running.restore_state(start)
+        outputs = running.run_guided(given, learns[part], known)
         measured = outputs["joint_torque"] if known is None else outputs["joint_torque"] + known
-        torque[part] = outputs["friction_torque"] - outputs["bias_torque"] - delayed_torque(data, given, measured)
+        torque[part] = outputs["friction_torque"] - outputs["bias_torque"]
+        torque[part] -= delayed_torque(finger.data, given, measured)
         angle[part], speed[part], slack[part] = outputs["joint_angle"], outputs["joint_speed"], outputs["slack"]
         variance[part] = outputs["residual_variance"]
         residual[part] = np.where(np.isnan(variance[part]), np.nan, outputs["residual"])
     return Model(torque, angle, speed, slack, residual, variance)
 
 
-def delayed_torque(data: Mapping[str, Any], arrays: Mapping[str, Numbers], torque: Numbers) -> Numbers | float:
+def delayed_torque(data: Data, arrays: Mapping[str, Numbers], torque: Numbers) -> Numbers | float:
     """Return τ of the forces in use less τ of the measured forces."""
     # torque: [N, n] (N·m); returns [N, n] (N·m). 0 unless a `time_delay` below 0 delays the forces
     rows = data.get("extensions") or []
     if not any(row["effect"] == "time_delay" and row["delay"] < 0 for row in rows):
         return 0.0
-    arms = np.array([tendon["moment_arms"] for tendon in data["tendons"]], dtype=float)
-    return np.asarray(torque - arrays["tendon_force"] @ arms)
+    return np.asarray(torque - arrays["tendon_force"] @ moment_arms(data))
 
 
 # --- what is random in them -------------------------------------------------------------------------------------------

@@ -7,7 +7,7 @@ over the level of the bounds.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,17 +20,18 @@ from tendonfmu.detect import (
     GRACE,
     ContactTuning,
     DetectionScore,
+    Estimate,
     Event,
-    RocPoint,
+    Figures,
+    Point,
     Scored,
-    ScoreReport,
     Track,
     TuneReport,
     tune_report,
 )
 from tendonfmu.files import counted
 from tendonfmu.recordings import flagged_stretches
-from tendonfmu.report.numbers import Table, with_ends
+from tendonfmu.report.numbers import Table
 from tendonfmu.report.page import write_figures
 
 PAGE, TUNING_PAGE = "score.html", "tuning.html"
@@ -185,8 +186,8 @@ def event_sheet(scored: Scored) -> draw.Sheet:
     count, summary = len(events), scored.summary
     groups = {
         "found": summary.found,
-        "missed": summary.events - summary.found - summary.masked,
-        "in an alarm before": summary.masked,
+        "missed": summary.missed - summary.missed_in_alarm,
+        "in an alarm before": summary.missed_in_alarm,
     }
     borders = np.cumsum([0, *groups.values()])
     middles = 0.5 * (borders[:-1] + borders[1:]) - 0.5
@@ -219,7 +220,7 @@ def event_sheet(scored: Scored) -> draw.Sheet:
         y_limits=(count - 0.5, -0.5),
     )
     title = f"{scored.finger.name}: {counted(count, 'event')}, {summary.found} found"
-    late = [1e3 * summary.delay[key].value for key in ("median", "ninety_percent")]
+    late = [1e3 * each.number for each in (summary.delay_s.median, summary.delay_s.ninety_percent)]
     caption = f"Half of those found within {late[0]:.0f} ms, 90 % within {late[1]:.0f} ms." if summary.found else ""
     return draw.Sheet("score", "events", title, [shown], caption)
 
@@ -241,12 +242,13 @@ def _row(track: Track, at: Numbers) -> Numbers:
 # --- other thresholds -------------------------------------------------------------------------------------------------
 
 
-def roc_sheet(scored: Scored, points: Sequence[RocPoint]) -> draw.Sheet:
+def roc_sheet(scored: Scored, points: Sequence[Point]) -> draw.Sheet:
     """Show found events and alarms over the factor on the thresholds."""
     factors = np.array([point.factor for point in points])
-    found, low, high = with_ends((point.found_share for point in points), 100.0)
+    shares = [point.found_share for point in points]
+    found, low, high = 100.0 * np.array([(each.number, *each.ends) for each in shares]).T
     in_alarm = 100.0 * np.array([point.free_alarm_share for point in points])
-    masked = 100.0 * np.array([point.masked / point.events for point in points])
+    masked = 100.0 * np.array([point.missed_in_alarm / scored.summary.events for point in points])
     shown = draw.panel(
         "Over the factor on all thresholds",
         "Share of the events that are found, and of the free time in alarm, over a factor on all thresholds",
@@ -313,81 +315,80 @@ def tail_sheet(tuning: ContactTuning) -> draw.Sheet:
 # --- a score in words -------------------------------------------------------------------------------------------------
 
 
-def score_tables(report: ScoreReport) -> Iterator[Table]:
+def score_tables(scored: Scored) -> Iterator[Table]:
     """List the tables to print: torque by joint, with 95 % intervals in brackets."""
-    columns: list[tuple[str, float, list[Any] | None]]
-    columns = [("free residual\nrms, mN·m", 1e3, _with_intervals(report, "free_rms"))]
-    if report["contact_torque_rms_error"] is not None:
-        columns += [
-            ("in contact: error\nrms, mN·m", 1e3, _with_intervals(report, "contact_torque_rms_error")),
-            ("correlation", 1.0, report["contact_torque_correlation"]),
-            ("slope", 1.0, report["contact_torque_slope"]),
-            ("within\n2 std, %", 100.0, report["contact_torque_within_two_std"]),
-        ]
-    columns.append(("at the alarm: median\n|external|, mN·m", 1e3, report["at_alarm"]["external_torque"]))
+    of = scored.summary
+    columns = [
+        ("free residual\nrms, mN·m", 1e3, _with_intervals(of.free_rms, of.free_rms_interval)),
+        (
+            "in contact: error\nrms, mN·m",
+            1e3,
+            _with_intervals(of.contact_torque_rms_error, of.contact_torque_rms_error_interval),
+        ),
+        ("correlation", 1.0, of.contact_torque_correlation),
+        ("slope", 1.0, of.contact_torque_slope),
+        ("within\n2 std, %", 100.0, of.contact_torque_within_two_std),
+        ("at the alarm: median\n|external|, mN·m", 1e3, of.at_alarm.external_torque),
+    ]
     shown = [(heading, [_estimate(each, factor) for each in values]) for heading, factor, values in columns if values]
     yield (
-        f"{report['finger']}: torque, with 95 % intervals",
+        f"{scored.finger.name}: torque, with 95 % intervals",
         ("joint", *(heading for heading, _ in shown)),
-        list(zip(report["joints"], *(cells for _, cells in shown), strict=True)),
+        list(zip(scored.finger.joint_names, *(cells for _, cells in shown), strict=True)),
     )
 
 
-def _with_intervals(report: Mapping[str, Any], key: str) -> list[Any]:
-    pairs = zip(report[key], report[f"{key}_interval"], strict=True)
-    return [{"value": value, "interval": interval} for value, interval in pairs]
+def _with_intervals(values: Sequence[float | None] | None, ends: Sequence[Any] | None) -> list[Estimate]:
+    return [Estimate(*each) for each in zip(values or (), ends or (), strict=True)]
 
 
-def score_lines(report: ScoreReport) -> Iterator[str]:
+def score_lines(scored: Scored) -> Iterator[str]:
     """List the lines to print: false alarms, events, delays, other thresholds."""
-    if report["events"]:
-        yield from _event_lines(report)
-    after, minutes = report["false_alarms_after_events"], report["free_minutes"]
+    of = scored.summary
+    if of.events:
+        yield from _event_lines(of)
+    after = of.false_alarms_after_events
     soon = f" ({after} of them within 2 s after an event)" if after else ""
     yield (
-        f"false alarms: {report['false_alarms']}{soon} in {minutes:.3g} min of free time, "
-        f"{_estimate(report['false_alarms_per_minute'])} per minute; "
-        f"in alarm {_estimate(report['free_alarm_share'], 100.0)} % of the free time"
+        f"false alarms: {of.false_alarms}{soon} in {of.free_minutes:.3g} min of free time, "
+        f"{_estimate(of.false_alarms_per_minute)} per minute; "
+        f"in alarm {_estimate(of.free_alarm_share, 100.0)} % of the free time"
     )
-    points = report["roc"]["points"] or []
-    shown = [point for point in points if any(math.isclose(point["factor"], factor) for factor in PRINTED)]
-    if shown and minutes:
-        factors = ", ".join(f"{point['factor']:g}" for point in shown)
-        some = ", ".join(f"{point['found']}" for point in shown)
-        rates = (point["false_alarms_per_hour"]["value"] or 0.0 for point in shown)
+    shown = [point for point in scored.roc or [] if any(math.isclose(point.factor, factor) for factor in PRINTED)]
+    if shown and of.free_minutes:
+        factors = ", ".join(f"{point.factor:g}" for point in shown)
+        some = ", ".join(f"{point.found}" for point in shown)
+        rates = (point.false_alarms_per_hour.value or 0.0 for point in shown)
         per_hour = ", ".join(f"{rate:.0f}" if rate >= 100 else f"{rate:.3g}" for rate in rates)
-        hit = f"{some} of {report['events']} found; " if report["events"] else ""
+        hit = f"{some} of {of.events} found; " if of.events else ""
         yield f"thresholds × {factors}: {hit}{per_hour} false alarms per hour"
-    if report["roc"]["absent"]:
-        yield f"no ROC: {report['roc']['absent']}"
+    if scored.no_roc:
+        yield f"no ROC: {scored.no_roc}"
 
 
-def _event_lines(report: ScoreReport) -> Iterator[str]:
-    found, masked, released = report["found"], report["missed_in_alarm"], report["found_at_release"]
-    why = f", {masked} of them in an alarm that had begun before" if masked else ""
-    late = f", {released} of them only as the load ends" if released else ""
-    share = _estimate(report["found_share"], 100.0)
-    yield f"events: {found} of {report['events']} found{late}, {share} %; {report['missed']} missed{why}"
-    if not found:
+def _event_lines(of: Figures) -> Iterator[str]:
+    why = f", {of.missed_in_alarm} of them in an alarm that had begun before" if of.missed_in_alarm else ""
+    late = f", {of.found_at_release} of them only as the load ends" if of.found_at_release else ""
+    share = _estimate(of.found_share, 100.0)
+    yield f"events: {of.found} of {of.events} found{late}, {share} %; {of.missed} missed{why}"
+    if not of.found:
         return
-    delay, over, force = report["delay_s"], report["overhang"], report["at_alarm"]["force"]
+    delay, over, force = of.delay_s, of.overhang, of.at_alarm.force
     lower, upper, ninety = (
-        _number(delay[key]["value"], 1e3) for key in ("lower_quartile", "upper_quartile", "ninety_percent")
+        _number(each.value, 1e3) for each in (delay.lower_quartile, delay.upper_quartile, delay.ninety_percent)
     )
-    yield f"delay: median {_estimate(delay['median'], 1e3)} ms, quartiles {lower} and {upper}, 90 % within {ninety}"
+    yield f"delay: median {_estimate(delay.median, 1e3)} ms, quartiles {lower} and {upper}, 90 % within {ninety}"
     felt = "" if force is None else f"; force at the alarm: median {_estimate(force)} N"
     yield (
-        f"held to their end: {report['held']} of {found}; alarms that outlast an event: {over['events']}, "
-        f"{over['seconds']:.3g} s in all, the longest {over['longest_s']:.3g} s{felt}"
+        f"held to their end: {of.held} of {of.found}; alarms that outlast an event: {over.events}, "
+        f"{over.seconds:.3g} s in all, the longest {over.longest_s:.3g} s{felt}"
     )
 
 
-def _estimate(estimate: Any, factor: float = 1.0) -> str:
-    """Format an estimate of a report with its interval, such as `12 (8.1 to 19)`."""
-    value, interval = _number(estimate["value"], factor), estimate["interval"]
-    if interval is None:
-        return value
-    return f"{value} ({_number(interval[0], factor)} to {_number(interval[1], factor)})"
+def _estimate(estimate: Estimate, factor: float = 1.0) -> str:
+    """Format an estimate with its interval, such as `12 (8.1 to 19)`."""
+    value, ends = _number(estimate.value, factor), estimate.interval
+    return value if ends is None else f"{value} ({_number(ends[0], factor)} to {_number(ends[1], factor)})"
 
 
 def _number(value: float | None, factor: float) -> str:

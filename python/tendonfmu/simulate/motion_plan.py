@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
 from tendonfmu.files import Node, Table, counted, read_table
-from tendonfmu.statistics import LARGEST_SEED, Draws
 
 Array = NDArray[np.float64]
 
+LARGEST_SEED = 2**53
 LONGEST = 1e6  # s
 # A stroke between resting points is a quintic; its peak speed is this times its mean speed (minimum jerk: Flash, Hogan,
 # "The coordination of arm movements", J. Neuroscience 5(7), 1985).
@@ -39,6 +39,35 @@ RANGES = {
     "acceleration": (-1e7, 1e7, "rad/s2"),
 }
 STILL = 1e-9  # rad/s, rad/s2; a joint with less stands still at the ends of a motion file
+
+
+class Draws:
+    """A separate stream of random numbers for every (seed, names); PCG64's raw numbers are the same in all versions."""
+
+    def __init__(self, seed: int, *stream: int) -> None:
+        self._generator = np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, *stream])))
+
+    def share(self) -> float:
+        """Draw a number."""
+        return float(self._generator.random())
+
+    def between(self, low: float, high: float) -> float:
+        """Draw a number between bounds."""
+        return low + (high - low) * self.share()
+
+    def sign(self) -> float:
+        """Draw a sign."""
+        return 1.0 if self.share() < 0.5 else -1.0
+
+    def direction(self) -> list[float]:
+        """Draw a direction (Marsaglia, Ann. Math. Statist. 43(2), 1972)."""
+        # returns unit vector [3], uniform on the sphere
+        while True:
+            x, y = self.between(-1.0, 1.0), self.between(-1.0, 1.0)
+            square = x * x + y * y
+            if square < 1.0:
+                root = 2.0 * math.sqrt(1.0 - square)
+                return [x * root, y * root, 1.0 - 2.0 * square]
 
 
 @dataclass(frozen=True)

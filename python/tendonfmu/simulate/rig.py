@@ -22,9 +22,8 @@ from tendonfmu.arrays import Data
 from tendonfmu.errors import InputError
 from tendonfmu.files import Node, Refusal, counted, format_of, read_json
 from tendonfmu.model import Finger, count, native, read_finger
-from tendonfmu.simulate.motion_plan import Joints, Motion, Segment, expand_motion, expand_pushes
+from tendonfmu.simulate.motion_plan import LARGEST_SEED, Joints, Motion, Segment, expand_motion, expand_pushes
 from tendonfmu.simulate.plant import Plant, refused_by
-from tendonfmu.statistics import LARGEST_SEED
 
 FORMAT = "tendonfmu-rig-1"
 WHAT = "a rig"
@@ -319,7 +318,7 @@ def _lines(rig: Rig, plant: Plant) -> list[str]:
         "integration": f"relative tolerance {plant.settings.relative_tolerance:g}",
         "recording": _recording_words(rig),
     }
-    head = f"{rig.name}, version {rig.version}: a valid rig of {finger.name}, seed {rig.expanded['seed']}"
+    head = f"{rig.name}, version {rig.version}: a valid rig of {rig.finger.name}, seed {rig.expanded['seed']}"
     return [head, *(f"{key:<18} {text}" for key, text in lines.items())]
 
 

@@ -5,15 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.arrays import Array
 from tendonfmu.files import counted
-from tendonfmu.simulate.plant import MEASURED, TRUE, Statistics, refused_by, require_plant
+from tendonfmu.simulate.plant import MEASURED, TRUE, refused_by, require_plant
 from tendonfmu.simulate.rig import Rig, plant_of
+
+if TYPE_CHECKING:
+    from tendonfmu.simulate.plant import Statistics
 
 Table = dict[str, NDArray[np.float64]]
 

@@ -10,12 +10,12 @@ inputs.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from tendonfmu.errors import InputError
-from tendonfmu.files import check_output, counted, whole_file
+from tendonfmu.files import check_output, counted, write_bytes
 from tendonfmu.fmu import (
     NOT_IN_XML,
     OMS,
@@ -41,8 +41,11 @@ from tendonfmu.fmu import (
     xml_text,
 )
 from tendonfmu.model import INPUTS, native, read_finger
-from tendonfmu.simulate.plant import Plant, Settings, refused_by
+from tendonfmu.simulate.plant import refused_by
 from tendonfmu.simulate.rig import Rig, plant_of, read_rig
+
+if TYPE_CHECKING:
+    from tendonfmu.simulate.plant import Settings
 
 # --- packing ----------------------------------------------------------------------------------------------------------
 # The binary is the same for every rig; the rig is a resource. The same input gives the same bytes. No compiler is
@@ -57,11 +60,7 @@ DURATION = 10.0  # s, of the default experiment if the rig has no recording
 
 def build_plant_fmu(rig_path: Path, output_path: Path, *, binaries: Path | None = None) -> Path:
     """Package the FMU of a rig's simulated finger."""
-    rig = read_rig(rig_path)
-    archive = pack(plant_members(rig, binaries=binaries))
-    with whole_file(output_path) as file:
-        file.write_bytes(archive)
-    return output_path
+    return write_bytes(output_path, pack(plant_members(read_rig(rig_path), binaries=binaries)))
 
 
 def plant_members(rig: Rig, *, binaries: Path | None = None) -> dict[str, bytes]:
@@ -70,7 +69,7 @@ def plant_members(rig: Rig, *, binaries: Path | None = None) -> dict[str, bytes]
     table = read_table(package_file("model_description/plant_variables.json").read_text(encoding="utf-8"))
     identifier = f"TendonFinger_{model_identifier(rig.name)}"
     context: dict[str, Any] = {
-        **describe_plant(rig, _settings(rig, text), table),
+        **describe_plant(rig, _settings(rig), table),
         "model_identifier": identifier,
         "guid": guid(text, table),
         "version": native.version(),
@@ -87,10 +86,9 @@ def plant_members(rig: Rig, *, binaries: Path | None = None) -> dict[str, bytes]
     }
 
 
-def _settings(rig: Rig, text: bytes) -> Settings:
+def _settings(rig: Rig) -> Settings:
     """Return the rig's own settings, from a plant that has accepted it."""
-    with refused_by(rig.path):
-        settings = Plant(text).settings
+    settings = plant_of(rig).settings
     if settings.seed > LARGEST_SEED:
         raise InputError(
             f"{rig.path}: seed = {settings.seed}: expected at most {LARGEST_SEED} in an FMU, whose Integer has 32 bits"
@@ -165,10 +163,7 @@ def build_ssp(rig_path: Path, output_path: Path, finger: Path | None = None) -> 
     content = ssp_members(rig)
     if finger is not None:
         content[f"resources/{FRICTION_FMU}"] = pack(members(read_finger(finger)))
-    archive = pack(content)
-    with whole_file(output_path) as file:
-        file.write_bytes(archive)
-    return output_path
+    return write_bytes(output_path, pack(content))
 
 
 def ssp_members(rig: Rig) -> dict[str, bytes]:
@@ -196,7 +191,7 @@ def system_structure(rig: Rig) -> bytes:
             SSD.System(
                 SSD.Elements(component(PLANT, PLANT_FMU, plant), component(FRICTION, FRICTION_FMU, friction)),
                 SSD.Connections(*(connection(PLANT, name, FRICTION, name) for name in coupled)),
-                SSD.Annotations(_master_of_omsimulator(_relative_tolerance(rig))),
+                SSD.Annotations(_master_of_omsimulator(plant_of(rig).settings.relative_tolerance)),
                 name="finger",
             ),
             SSD.DefaultExperiment(startTime="0.0", stopTime=str(DURATION if rig.duration is None else rig.duration)),
@@ -218,12 +213,6 @@ def start_values(rig: Rig) -> bytes:
         for i, value in enumerate(signals[f"measured_{group}"][0], start=1)
     }
     return parameter_values("start_values", values)
-
-
-def _relative_tolerance(rig: Rig) -> float:
-    """Return the rig's tolerance, which is that of the plant's default experiment."""
-    with refused_by(rig.path):
-        return float(plant_of(rig).settings.relative_tolerance)
 
 
 def _master_of_omsimulator(tolerance: float) -> Any:

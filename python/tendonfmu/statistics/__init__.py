@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     )
     from .intervals import BlockIndex, Interval, blocks_of, gain_interval, variance_between
     from .noisy_regression import Estimate, noisy_regression
-    from .random_numbers import LARGEST_SEED, Draws
     from .whitening import Line, Whitener, effective_samples, find_lines, sample_weights, whitener
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

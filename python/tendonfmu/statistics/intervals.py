@@ -98,7 +98,6 @@ def _percentiles(drawn: Numbers) -> tuple[float, float]:
 
 
 BLOCK = 2.0  # s; longer than residuals of a fitted finger are correlated
-LEVEL = 0.95
 FEWEST_BLOCKS = 3  # blocks; fewer give no interval
 _FEW, _SHORTEST = 6, 0.5  # blocks, wanted at least; s, shortest block for this
 _RESAMPLES = 4000
@@ -183,15 +182,14 @@ def _quantiles(pairs: Numbers, estimate: float, seed: int) -> tuple[float, float
     """Return the quantiles of the studentised log ratio."""
     from scipy.stats import t
 
-    tail = (1 - LEVEL) / 2
-    plain = float(t.ppf(1 - tail, len(pairs) - 1))
+    plain = float(t.ppf(1 - _TAIL, len(pairs) - 1))
     if len(pairs) < _LEAST_PLAIN:
         return -plain, plain
     shares = np.full(len(pairs), 1 / len(pairs))
     draws = np.random.default_rng(seed).multinomial(len(pairs), shares, _RESAMPLES).astype(float)
     drawn, errors = _log_ratio(draws, pairs)
     studentised = (drawn - estimate) / np.where(errors > 0, errors, np.nan)
-    low, high = np.nanquantile(studentised, [tail, 1 - tail])
+    low, high = np.nanquantile(studentised, [_TAIL, 1 - _TAIL])
     return float(low), float(high)
 
 

@@ -271,8 +271,7 @@ def _written(recording: recorded.Recording, target: Path) -> str:
         made = Path(scratch) / target.name
         recording.write(made)
         if not (target.is_file() and filecmp.cmp(made, target, shallow=False)):
-            with files.whole_file(target) as temporary:
-                temporary.write_bytes(made.read_bytes())
+            files.write_bytes(target, made.read_bytes())
     return os.path.abspath(target)
 
 

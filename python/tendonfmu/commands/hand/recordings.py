@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.arrays import Numbers
-from tendonfmu.commands.hand.description import Hand, HandPart, read_hand
-from tendonfmu.commands.hand.hand_types import WRIST
+from tendonfmu.commands.hand.description import WRIST, Hand, HandPart, read_hand
 from tendonfmu.commands.run import RunResult
 from tendonfmu.commands.run import run as run_finger
 from tendonfmu.errors import InputError, InputWarning

@@ -12,10 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from tendonfmu import fmu
-from tendonfmu.commands.hand.description import Hand, HandPart
-from tendonfmu.commands.hand.hand_types import WRIST
+from tendonfmu.commands.hand.description import WRIST, Hand, HandPart
 from tendonfmu.commands.hand.recordings import HandRecording, split_parts
-from tendonfmu.files import whole_file
+from tendonfmu.files import write_bytes
 
 START_VALUES = "resources/start_values.ssv"
 TENDONS = ("tendon_force", "tendon_position")
@@ -35,9 +34,7 @@ def build_hand_ssp(hand: Hand, output: Path, start: HandRecording | None = None)
     }
     for part in hand.parts:
         content[f"resources/{_fmu(part)}"] = fmu.pack(fmu.members(part.finger))
-    with whole_file(output) as file:
-        file.write_bytes(fmu.pack(content))
-    return output
+    return write_bytes(output, fmu.pack(content))
 
 
 def _fmu(part: HandPart) -> str:

@@ -16,9 +16,8 @@ from typing import Any, NamedTuple
 from tendonfmu.arrays import Data
 from tendonfmu.diagnosis.samples import Span
 from tendonfmu.errors import InputError
-from tendonfmu.estimate import MAGNITUDES
 from tendonfmu.files import counted
-from tendonfmu.model import get_number, law_path, own_copy, set_number
+from tendonfmu.model import LAW_NUMBERS, get_number, law_path, own_copy, set_number
 
 # --- changes of a description -----------------------------------------------------------------------------------------
 # An absent law gets a negligible friction, because the estimator refuses a law without any. A law that is split into
@@ -47,7 +46,7 @@ def add_law(data: dict[str, Any], path: str) -> None:
     """Add a law where there was none."""
     place = law_path(path)
     if place is None or place.tendon is None:
-        set_number(data, path, dict(_ABSENT))  # type: ignore[arg-type]
+        set_number(data, path, dict(_ABSENT))
         return
     tendon = data["tendons"][place.tendon - 1]
     entries = list(tendon.get(place.kind) or [])
@@ -62,7 +61,7 @@ def add_points(angles: Sequence[float]) -> Callable[[dict[str, Any], str], None]
     def add(data: dict[str, Any], path: str) -> None:
         law = get_number(data, path)
         laws = [own_copy(law) for _ in angles]
-        set_number(data, path, {"angles": list(angles), "laws": laws})  # type: ignore[arg-type]
+        set_number(data, path, {"angles": list(angles), "laws": laws})
 
     return add
 
@@ -153,7 +152,7 @@ def raise_to(data: dict[str, Any], path: str, share: float) -> None:
 
 def magnitudes_of(side: Mapping[str, Any]) -> tuple[float, float, float]:
     """Return Coulomb friction, static − coulomb and viscous friction of a side."""
-    static, coulomb, _, viscous = (float(side.get(key) or 0.0) for key in MAGNITUDES)
+    static, coulomb, _, viscous = (float(side.get(key) or 0.0) for key in LAW_NUMBERS)
     return coulomb, static - coulomb, viscous
 
 

@@ -30,7 +30,7 @@ from tendonfmu.diagnosis.effects.mechanism import (
     with_rows,
 )
 from tendonfmu.diagnosis.effects.places import ANGLES, largest_coulomb, law_path, laws_at
-from tendonfmu.model import DEFAULTS, EFFECT_NUMBERS, LEFT_OUT, MAGNITUDES, get_number, velocity_threshold
+from tendonfmu.model import DEFAULTS, EFFECT_NUMBERS, LEFT_OUT, get_number, velocity_threshold
 
 Make = Callable[[str, Data, Place, Shape], Variant]
 
@@ -54,7 +54,8 @@ def row(least: float = -math.inf, **signs: int) -> Make:
     def make(name: str, data: Data, place: Place, shape: Shape) -> Variant:
         path = f"extensions[{len(data.get('extensions') or []) + 1}]"
         columns = tuple(
-            Column({f"{path}.{number}": 1.0}, sign, MAGNITUDES[name][number], least) for number, sign in signs.items()
+            Column({f"{path}.{number}": 1.0}, sign, EFFECT_NUMBERS[name][number].scale, least)
+            for number, sign in signs.items()
         )
         written = {key: value for key, value in shape.items() if value != LEFT_OUT.get(key)}
         return Variant(data, shape, columns, rows=(_row(name, place, dict.fromkeys(signs, 0.0) | written),))
