@@ -35,7 +35,11 @@ def quantity(value: float, unit: str, *, sign: bool = False) -> str:
 def presliding(numbers: Sizes) -> str:
     """Return over what friction builds up, or how stiff it is before it slips."""
     name, text = ("displacement", "over {}") if "displacement" in numbers else ("stiffness", "a stiffness of {}")
-    return text.format(" and ".join(dict.fromkeys(quantity(*number) for number in numbers[name])))
+    of_unit: dict[str, list[float]] = {}
+    for value, unit in numbers[name]:
+        of_unit.setdefault(unit, []).append(value)
+    ranges = [dict.fromkeys(quantity(end, unit) for end in (min(own), max(own))) for unit, own in of_unit.items()]
+    return text.format(" and ".join(" to ".join(ends) for ends in ranges))
 
 
 def _one(numbers: Sizes, name: str) -> tuple[float, str]:
