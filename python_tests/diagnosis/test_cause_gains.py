@@ -12,9 +12,16 @@ from fit_cases import small_finger
 from tendonfmu.diagnosis import extension_diagnosis as whole
 from tendonfmu.diagnosis.answer import not_taken
 from tendonfmu.diagnosis.effects import Place, Term, Where, by_name
+from tendonfmu.diagnosis.effects.words import presliding
 from tendonfmu.diagnosis.result import Cause
 from tendonfmu.diagnosis.selection import Judged, names_needed
 from tendonfmu.statistics import Interval
+
+
+def test_a_memory_with_many_rows_has_a_range_of_each_unit() -> None:
+    many = [(3e-4, "m"), (1e-4, "m"), (0.02, "rad"), (2e-4, "m")]
+    assert presliding({"displacement": many}).replace("\xa0", " ") == "over 0.1 mm to 0.3 mm and 20 mrad"
+    assert presliding({"stiffness": [(4e3, "N/m")] * 2}).replace("\xa0", " ") == "a stiffness of 4·10³ N/m"
 
 
 def test_each_further_name_needs_more() -> None:
