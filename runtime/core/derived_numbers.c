@@ -113,7 +113,7 @@ static void derive_band(const derivation* d, const model_item* item) {
   const size_t number = item->kind - ITEM_BAND_NOISE;
   for (size_t j = 0; j < item->count; ++j) {
     const double value = d->values[item->first + j];
-    d->finger->derived.band_square[(j * BANDS + item->point) * BAND_NUMBERS + number] = value * value;
+    d->finger->derived.band_square[(j * BAND_NUMBERS + number) * BANDS + item->point] = value * value;
   }
 }
 

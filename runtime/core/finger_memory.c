@@ -130,7 +130,7 @@ static const finger_row other_rows[] = {
     {ROWS(scratch.force, scratch.slack), .unit = OF_TENDONS},
     {ROWS(scratch.angle, scratch.residual_variance), .unit = OF_JOINTS},
     {ROWS(scratch.edge, scratch.force_between), .unit = OF_MATRIX},
-    {ROWS(scratch.slip_torque, scratch.unknown), .unit = OF_JOINTS, .when = WITH_BANDS},
+    {ROWS(scratch.slip_torque, scratch.young), .unit = OF_JOINTS, .when = WITH_BANDS},
     {ROWS(scratch.edge_limit, scratch.pulley_limit), .unit = OF_SLOTS, .when = WITH_BANDS},
     {ROW(scratch.sensor), .unit = OF_TENDONS, .count = SENSOR_NUMBERS, .when = WITH_SENSOR_FAULT},
     {ROW(scratch.inverse_routing), .unit = OF_MATRIX, .when = WITH_SENSOR_FAULT},

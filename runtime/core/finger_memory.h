@@ -101,7 +101,7 @@ typedef struct derived_numbers {
   double *contact_threshold, *contact_per_force; /* [N] */
   double* initial_torque;                        /* [N] */
   double *deviation, *deviation_per_force;       /* [N] */
-  double* band_square; /* [n × BANDS × BAND_NUMBERS] squares of the numbers of contact.bands */
+  double* band_square; /* [n × BAND_NUMBERS × BANDS] squares of the numbers of contact.bands */
   double* load_arm;    /* [n × M] r_ij·k_i; this and the one before with contact.bands only */
   link_geometry links; /* arrays NULL without links */
   int* least_link;     /* [n] of find_least_links() */
@@ -247,6 +247,7 @@ typedef struct finger_scratch {
   double *slip_torque, *limit;       /* [N] friction of eq. (10), all that it can be: B, N·m */
   double* motor_load;                /* [N] x, N·m */
   double* unknown;                   /* [N] max(V, W) before this sample, N·m */
+  double* young;                     /* [N] of band_find_shares() */
   band_shares shares;                /* of the last step */
   /* with sensor_fault only */
   double* sensor;           /* [M] as in the state, after this sample */

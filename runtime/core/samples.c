@@ -101,15 +101,10 @@ static void give_deviations(double* to, const double* variance, size_t count, si
 
 /* 0 without contact.bands */
 static void give_terms(double* to, const tendonfmu_finger* f, size_t row) {
-  const size_t width = BANDS * BAND_TERMS, n = f->joints;
-  for (size_t j = 0; to && j < n; ++j) {
-    for (size_t k = 0; k < BANDS; ++k) {
-      double* terms = to + (row * n + j) * width + k * BAND_TERMS;
-      if (f->derived.settings.has_bands) {
-        band_terms(bands_of(f, j), k, terms);
-      } else {
-        memset(terms, 0, BAND_TERMS * sizeof *terms);
-      }
+  for (size_t j = 0; to && j < f->joints; ++j) {
+    const band_terms none = {{{0.0}}}, terms = f->derived.settings.has_bands ? find_band_terms(bands_of(f, j)) : none;
+    for (size_t k = 0; k < BANDS * BAND_TERMS; ++k) {
+      to[(row * f->joints + j) * BANDS * BAND_TERMS + k] = terms.of[k % BAND_TERMS][k / BAND_TERMS];
     }
   }
 }

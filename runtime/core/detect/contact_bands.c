@@ -4,8 +4,6 @@
 
 #include <math.h>
 
-#include "friction_law.h"
-
 static const double mean_time[BANDS] = {0.004, 0.02, 0.06, 0.5};    /* A, s */
 static const double reference_time[BANDS] = {0.05, 0.3, 1.0, 10.0}; /* M, s */
 
@@ -27,12 +25,9 @@ static double smaller(double a, double b) {
   return a < b ? a : b;
 }
 
-void band_find_shares(band_shares* shares, double step,
-                      void (*one_minus_exponentials)(const double* x, double* values, size_t count)) {
+/* what depends on the step alone */
+static void find_shares_of_step(band_shares* shares, double step, exponentials* one_minus_exponentials) {
   _Alignas(32) double value[12] = {[8] = step / HELD_TIME, [9] = step / UNKNOWN_TIME};
-  if (shares->step == step) {
-    return;
-  }
   for (size_t k = 0; k < BANDS; ++k) {
     value[k] = step / mean_time[k];
     value[BANDS + k] = step / reference_time[k];
@@ -46,6 +41,22 @@ void band_find_shares(band_shares* shares, double step,
   }
   shares->held = value[8];
   shares->unknown = 1.0 - value[9];
+}
+
+void band_find_shares(band_shares* shares, double* young, const band_memory* bands, size_t joints, double time,
+                      double step, exponentials* one_minus_exponentials) {
+  int any = 0;
+  if (shares->step != step) {
+    find_shares_of_step(shares, step, one_minus_exponentials);
+  }
+  for (size_t j = 0; j < joints; ++j) {
+    const double age = time - bands[j].begun_at;
+    young[j] = step / age;
+    any |= age < reference_time[BANDS - 1];
+  }
+  if (any) {
+    one_minus_exponentials(young, young, (joints + 3) / 4 * 4);
+  }
 }
 
 void band_begin(band_memory* joint, const band_sample* sample, double time, double unknown, int first) {
@@ -68,11 +79,10 @@ void band_begin(band_memory* joint, const band_sample* sample, double time, doub
 }
 
 /* σ of the means and the references of a joint that began `age` ago: means of what there has been since */
-static void find_shares_since(const band_shares* shares, double age, double* quick, double* slow) {
-  const double all = age < reference_time[BANDS - 1] ? law_one_minus_exponential(shares->step / age) : 0.0;
+static void find_shares_since(const band_shares* shares, double age, double young, double* quick, double* slow) {
   for (size_t k = 0; k < BANDS; ++k) {
-    quick[k] = age < mean_time[k] ? all : shares->mean[k];
-    slow[k] = age < reference_time[k] ? all : shares->reference[k];
+    quick[k] = age < mean_time[k] ? young : shares->mean[k];
+    slow[k] = age < reference_time[k] ? young : shares->reference[k];
   }
 }
 
@@ -85,9 +95,9 @@ static void follow(double* mean, double* reference, double value, const double* 
 }
 
 static void follow_sample(band_memory* joint, const band_sample* sample, const band_shares* shares, double age,
-                          int any) {
+                          double young, int any) {
   double quick[BANDS], slow[BANDS], own[BANDS];
-  find_shares_since(shares, age, quick, slow);
+  find_shares_since(shares, age, young, quick, slow);
   for (size_t k = 0; k < BANDS; ++k) {
     own[k] = any ? shares->held : slow[k];
   }
@@ -110,44 +120,57 @@ double band_unknown(const band_memory* joint) {
   return larger(joint->unknown, joint->turned);
 }
 
-void band_terms(const band_memory* joint, size_t band, double* terms) {
-  const double mean = joint->mean[band], change = mean - joint->reference[band];
-  const double from_home = change < 0.0 ? joint->home - mean : mean - joint->home;
-  const double size = larger(0.0, smaller(fabs(change), from_home));
-  const double turned = fabs(joint->torque[band] - joint->torque_reference[band]);
-  terms[0] = change;
-  terms[1] = copysign(size, change);
-  terms[2] = 1.0;
-  terms[3] = joint->friction;
-  terms[4] = joint->limit;
-  terms[5] = joint->driven[band];
-  terms[6] = smaller(turned, joint->driven[band]);
-  terms[7] = smaller(joint->reserve[band], joint->driven[RESERVE_BAND]);
-}
-
-/* what counts of a band's change, squared, and its bound, squared */
-static void find_squares(const band_memory* joint, size_t band, const double numbers[BAND_NUMBERS], double* size,
-                         double* bound) {
-  double terms[BAND_TERMS];
-  band_terms(joint, band, terms);
-  const double unknown = band_unknown(joint);
-  *bound = unknown * unknown;
-  for (size_t i = 0; i < BAND_NUMBERS; ++i) {
-    *bound += numbers[i] * (terms[2 + i] * terms[2 + i]);
+band_terms find_band_terms(const band_memory* joint) {
+  band_terms terms;
+  for (size_t k = 0; k < BANDS; ++k) {
+    const double mean = joint->mean[k], change = mean - joint->reference[k];
+    const double from_home = copysign(1.0, change) * (mean - joint->home);
+    const double size = larger(0.0, smaller(fabs(change), from_home));
+    const double turned = fabs(joint->torque[k] - joint->torque_reference[k]);
+    terms.of[0][k] = change;
+    terms.of[1][k] = copysign(size, change);
+    terms.of[2][k] = 1.0;
+    terms.of[3][k] = joint->friction;
+    terms.of[4][k] = joint->limit;
+    terms.of[5][k] = joint->driven[k];
+    terms.of[6][k] = smaller(turned, joint->driven[k]);
+    terms.of[7][k] = smaller(joint->reserve[k], joint->driven[RESERVE_BAND]);
   }
-  *size = terms[1] * terms[1];
+  return terms;
 }
 
-double band_take(band_memory* joint, const band_sample* sample, const band_shares* shares,
-                 const double squares[BANDS * BAND_NUMBERS], double time, int before, int any, size_t* band) {
-  double most = 0.0, bound_of_most = 1.0;
+/* the largest share of its bound that what counts of a band's change has, both squared; and of which band */
+static double find_largest(const band_memory* joint, const double* squares, size_t* band) {
+  const band_terms terms = find_band_terms(joint);
+  const double unknown = band_unknown(joint);
+  double bound[BANDS], most = 0.0, bound_of_most = 1.0;
+  for (size_t k = 0; k < BANDS; ++k) {
+    bound[k] = unknown * unknown;
+    for (size_t i = 0; i < BAND_NUMBERS; ++i) {
+      bound[k] += squares[i * BANDS + k] * (terms.of[2 + i][k] * terms.of[2 + i][k]);
+    }
+  }
   *band = 0;
-  follow_sample(joint, sample, shares, time - joint->begun_at, any);
+  for (size_t k = 0; k < BANDS; ++k) {
+    const double size = terms.of[1][k] * terms.of[1][k];
+    if (size * bound_of_most > most * bound[k]) { /* one division for all bands */
+      most = size;
+      bound_of_most = bound[k];
+      *band = k;
+    }
+  }
+  return most / bound_of_most;
+}
+
+double band_take(band_memory* joint, const band_sample* sample, const band_shares* shares, double young,
+                 const double squares[BANDS * BAND_NUMBERS], double time, int before, int any, size_t* band) {
+  follow_sample(joint, sample, shares, time - joint->begun_at, young, any);
   if (joint->has_moved == 0.0) {
     joint->turned = larger(joint->turned, sample->limit - sample->reserve);
     if (!before && joint->turned > TURNED * sample->limit) {
       band_begin(joint, sample, time, sample->limit, 1);
       joint->has_moved = 1.0;
+      *band = 0;
       return 0.0;
     }
     if (fabs(sample->angle - joint->start) > MOVED) {
@@ -155,16 +178,7 @@ double band_take(band_memory* joint, const band_sample* sample, const band_share
       joint->has_moved = 1.0;
     }
   }
-  for (size_t k = 0; k < BANDS; ++k) {
-    double size, bound;
-    find_squares(joint, k, squares + k * BAND_NUMBERS, &size, &bound);
-    if (size * bound_of_most > most * bound) { /* one division for all bands */
-      most = size;
-      bound_of_most = bound;
-      *band = k;
-    }
-  }
-  return sqrt(smaller(most / bound_of_most, HIGHEST));
+  return sqrt(smaller(find_largest(joint, squares, band), HIGHEST));
 }
 
 int band_decide(band_memory* joint, const band_sample* sample, const band_shares* shares, double time, double rounding,

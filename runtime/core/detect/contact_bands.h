@@ -45,15 +45,19 @@ typedef struct band_shares {
   double unknown;
 } band_shares;
 
-/* Fills the shares unless they are those of this step. one_minus_exponentials: of a kernel (kernel_choice.h). */
-void band_find_shares(band_shares* shares, double step,
-                      void (*one_minus_exponentials)(const double* x, double* values, size_t count));
+/* 1 − exp(−x) of a row (kernel_choice.h) */
+typedef void exponentials(const double* x, double* values, size_t count);
+
+/* Fills the shares of this step, and into young [N] those of joints whose means have just begun. */
+void band_find_shares(band_shares* shares, double* young, const band_memory* bands, size_t joints, double time,
+                      double step, exponentials* one_minus_exponentials);
 
 /* A joint begins anew; unknown: V. First: at the first sample, where it was not watched, and when it first moves. */
 void band_begin(band_memory* joint, const band_sample* sample, double time, double unknown, int first);
 
-/* Takes a sample; of the one before: whether the joint was in contact, and whether any was. Returns the level. */
-double band_take(band_memory* joint, const band_sample* sample, const band_shares* shares,
+/* Takes a sample; of the one before: whether the joint was in contact, and whether any was. squares [BAND_NUMBERS ×
+ * BANDS]. Returns the level. */
+double band_take(band_memory* joint, const band_sample* sample, const band_shares* shares, double young,
                  const double squares[BANDS * BAND_NUMBERS], double time, int before, int any, size_t* band);
 
 /* Whether a joint is in contact now, from whether it was, its level and the band that has it. */
@@ -63,5 +67,8 @@ int band_decide(band_memory* joint, const band_sample* sample, const band_shares
 /* max(V, W): friction whose state nobody knows, N·m. */
 double band_unknown(const band_memory* joint);
 
-/* The terms of a band [BAND_TERMS]. */
-void band_terms(const band_memory* joint, size_t band, double* terms);
+typedef struct band_terms {
+  double of[BAND_TERMS][BANDS];
+} band_terms;
+
+band_terms find_band_terms(const band_memory* joint);

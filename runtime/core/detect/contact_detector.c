@@ -55,7 +55,8 @@ static int exceed_bands(tendonfmu_finger* f, double time, double step) {
   const finger_state* s = &f->remembered;
   const int before = s->scalar[STATE_CONTACT] != 0.0;
   int any = 0;
-  band_find_shares(&f->scratch.shares, step, f->kernel->one_minus_exponentials);
+  band_find_shares(&f->scratch.shares, f->scratch.young, bands_of(f, 0), f->joints, time, step,
+                   f->kernel->one_minus_exponentials);
   for (size_t j = 0; j < f->joints; ++j) {
     f->scratch.unknown[j] = band_unknown(bands_of(f, j));
     if (f->derived.settings.watches_sensors && s->watch[j] != JOINT_WATCHED) {
@@ -66,7 +67,8 @@ static int exceed_bands(tendonfmu_finger* f, double time, double step) {
     const double* squares = f->derived.band_square + j * BANDS * BAND_NUMBERS;
     size_t band = 0;
     const int touched = s->joint_contact[j] != 0.0;
-    s->level[j] = band_take(bands_of(f, j), &sample, &f->scratch.shares, squares, time, touched, before, &band);
+    s->level[j] = band_take(bands_of(f, j), &sample, &f->scratch.shares, f->scratch.young[j], squares, time, touched,
+                            before, &band);
     s->joint_contact[j] = band_decide(bands_of(f, j), &sample, &f->scratch.shares, time, CLOCK_ROUNDING * step, touched,
                                       s->level[j], band);
     any |= s->joint_contact[j] != 0.0;
