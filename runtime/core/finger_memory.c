@@ -30,6 +30,7 @@ static void* take(cursor* c, size_t bytes) {
 #define AT(name)          offsetof(tendonfmu_finger, name)
 #define ROWS(first, last) .place = AT(first), .pointers = (AT(last) - AT(first)) / sizeof(double*) + 1
 #define ROW(name)         ROWS(name, name)
+#define SENSORS(memory)   ROWS(memory.fault, memory.joint_side_then)
 #define WITHIN(most)      .low = -(most), .high = (most)
 #define INSTANT           WITHIN(LARGEST_TIME), .spare = 1
 #define FLAG              .high = 1.0, .whole = 1
@@ -86,8 +87,7 @@ const finger_row state_rows[] = {
     {ROW(remembered.jumped), .unit = OF_JOINTS, .when = WITH_BANDS, WITHIN(LARGEST_SUM)},
     {ROW(remembered.bands), .unit = OF_JOINTS, .count = sizeof(band_memory) / sizeof(double), .when = WITH_BANDS,
      WITHIN(2.0 * LARGEST_SUM), .spare = 1},
-    {ROW(remembered.sensor), .unit = OF_TENDONS, .count = SENSOR_NUMBERS, .when = WITH_SENSOR_FAULT, .parts = sensors,
-     .together = 1},
+    {SENSORS(remembered.sensor), .unit = OF_TENDONS, .when = WITH_SENSOR_FAULT, .parts = sensors},
     {ROW(remembered.watch), .unit = OF_JOINTS, .when = WITH_SENSOR_FAULT, .high = JOINT_BEGINS_ANEW, .whole = 1},
     {ROW(remembered.element), .unit = OF_ELEMENTS, .count = 2, .when = WITH_MEMORY, WITHIN(LARGEST_SUM), .spare = 1},
     {ROWS(remembered.by_turning, remembered.by_limit), .unit = OF_SLOTS, .count = 2, .when = WITH_MEMORY,
@@ -96,6 +96,16 @@ const finger_row state_rows[] = {
     {ROW(remembered.extension), .unit = OF_EXTENSIONS, WITHIN(DBL_MAX), .spare = 1},
 };
 const size_t state_row_count = sizeof state_rows / sizeof state_rows[0];
+
+/* what the last of these become with this sample, in the same order */
+static const finger_row next_rows[] = {
+    {SENSORS(scratch.sensor), .unit = OF_TENDONS, .when = WITH_SENSOR_FAULT},
+    {ROW(scratch.watch), .unit = OF_JOINTS, .when = WITH_SENSOR_FAULT},
+    {ROW(scratch.element), .unit = OF_ELEMENTS, .count = 2, .when = WITH_MEMORY},
+    {ROWS(scratch.by_turning, scratch.by_limit), .unit = OF_SLOTS, .count = 2, .when = WITH_MEMORY},
+    {ROW(scratch.tension), .unit = OF_SLOTS, .count = 2, .when = WITH_CORDS},
+    {ROW(scratch.extension), .unit = OF_EXTENSIONS},
+};
 
 /* the parameters in force and all that follows from them: one run, which another finger may take over */
 static const finger_row prepared_rows[] = {
@@ -120,22 +130,17 @@ static const finger_row prepared_rows[] = {
 
 static const finger_row other_rows[] = {
     {ROWS(start, candidate), .unit = OF_PARAMETERS},
-    {ROW(scratch.extension), .unit = OF_EXTENSIONS},
     {ROWS(scratch.grip, scratch.bias_grip), .unit = OF_SLOTS, .when = WITH_EXTENSIONS},
     {ROW(scratch.travelled), .unit = OF_SLOTS, .when = WITH_MEMORY},
     {ROW(scratch.own_limit), .unit = OF_JOINTS, .when = WITH_MEMORY},
-    {ROW(scratch.element), .unit = OF_ELEMENTS, .count = 2, .when = WITH_MEMORY},
-    {ROWS(scratch.by_turning, scratch.by_limit), .unit = OF_SLOTS, .count = 2, .when = WITH_MEMORY},
-    {ROW(scratch.tension), .unit = OF_SLOTS, .count = 2, .when = WITH_CORDS},
     {ROWS(scratch.force, scratch.slack), .unit = OF_TENDONS},
     {ROWS(scratch.angle, scratch.residual_variance), .unit = OF_JOINTS},
     {ROWS(scratch.edge, scratch.force_between), .unit = OF_MATRIX},
     {ROWS(scratch.slip_torque, scratch.young), .unit = OF_JOINTS, .when = WITH_BANDS},
     {ROWS(scratch.edge_limit, scratch.pulley_limit), .unit = OF_SLOTS, .when = WITH_BANDS},
-    {ROW(scratch.sensor), .unit = OF_TENDONS, .count = SENSOR_NUMBERS, .when = WITH_SENSOR_FAULT},
     {ROW(scratch.inverse_routing), .unit = OF_MATRIX, .when = WITH_SENSOR_FAULT},
     {ROWS(scratch.leverage, scratch.row_in_use), .unit = OF_TENDONS, .when = WITH_SENSOR_FAULT},
-    {ROWS(scratch.watch, scratch.angle_shift), .unit = OF_JOINTS, .when = WITH_SENSOR_FAULT},
+    {ROW(scratch.angle_shift), .unit = OF_JOINTS, .when = WITH_SENSOR_FAULT},
     {ROW(scratch.velocity), .unit = OF_SLOTS},
 };
 
@@ -206,14 +211,15 @@ static void lay_out_prepared(tendonfmu_finger* f, cursor* c) {
   f->prepared_bytes = c->used - begin;
 }
 
-static void lay_out_state(tendonfmu_finger* f, cursor* c) {
+/* rows without gaps; returns how many numbers */
+static size_t place_run(tendonfmu_finger* f, cursor* c, const finger_row* rows, size_t count, double** run) {
   take(c, 0); /* to where a row begins */
   const size_t begin = c->used;
-  c->row_bytes = sizeof(double); /* one run */
-  place_rows(f, c, state_rows, state_row_count);
+  *run = (double*)(void*)(c->base ? c->base + begin : NULL);
+  c->row_bytes = sizeof(double);
+  place_rows(f, c, rows, count);
   c->row_bytes = ROW_BYTES;
-  f->state = f->remembered.scalar;
-  f->state_count = (c->used - begin) / sizeof(double);
+  return (c->used - begin) / sizeof(double);
 }
 
 static size_t lay_out(const model_shape* shape, tendonfmu_finger* f, unsigned char* base, uint32_t** words) {
@@ -226,7 +232,8 @@ static size_t lay_out(const model_shape* shape, tendonfmu_finger* f, unsigned ch
   f->tendon_lanes = (f->tendons + 3) / 4 * 4;
   f->slots = f->joints * f->tendon_lanes + f->joint_lanes;
   *words = take(&c, sizeof(uint32_t) * (shape->word_count + (size_t)MODEL_EXTENSION_WORDS * shape->extension_count));
-  lay_out_state(f, &c);
+  f->state_count = place_run(f, &c, state_rows, state_row_count, &f->state);
+  f->next_count = place_run(f, &c, next_rows, sizeof next_rows / sizeof next_rows[0], &f->next);
   lay_out_prepared(f, &c);
   place_rows(f, &c, other_rows, sizeof other_rows / sizeof other_rows[0]);
   f->extensions.row = take(&c, f->shape.extension_count * sizeof(extension_row));

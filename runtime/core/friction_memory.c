@@ -174,18 +174,6 @@ void turn_places(tendonfmu_finger* f, double step) {
   }
 }
 
-void remember_elements(tendonfmu_finger* f) {
-  const finger_state* to = &f->remembered;
-  const finger_scratch* from = &f->scratch;
-  const size_t bytes = 2 * f->slots * sizeof(double);
-  memcpy(to->element, from->element, f->memory.elements * bytes);
-  memcpy(to->by_turning, from->by_turning, bytes);
-  memcpy(to->by_limit, from->by_limit, bytes);
-  if (f->memory.compliance > 0.0) {
-    memcpy(to->tension, from->tension, bytes);
-  }
-}
-
 /* --- friction as a torque -------------------------------------------------------------------------------------------
  */
 

@@ -111,13 +111,13 @@ static void give_terms(double* to, const tendonfmu_finger* f, size_t row) {
 
 /* failing sensors and what they hide; 0 without sensor_fault */
 static void give_sensors(const tendonfmu_finger* finger, const tendonfmu_outputs* outputs, size_t row) {
-  const sensor_memory* sensor = sensors_in(finger->remembered.sensor);
+  const double* fault = finger->remembered.sensor.fault;
   const size_t m = finger->tendons;
   for (size_t i = 0; outputs->sensor_fault && i < m; ++i) {
-    outputs->sensor_fault[row * m + i] = sensor && sensor[i].fault != SENSOR_IS_WELL;
+    outputs->sensor_fault[row * m + i] = fault && fault[i] != SENSOR_IS_WELL;
   }
   if (outputs->contact_observable) {
-    outputs->contact_observable[row] = sensor && !any_joint_is_blind(finger);
+    outputs->contact_observable[row] = fault && !any_joint_is_blind(finger);
   }
 }
 

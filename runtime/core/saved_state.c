@@ -9,7 +9,7 @@
 #include "parameters.h"
 #include "sensor_fault.h"
 
-enum { HEADER_BYTES = 40, HASHED_FROM = 32, STATE_VERSION = 3 };
+enum { HEADER_BYTES = 40, HASHED_FROM = 32, STATE_VERSION = 4 };
 
 static const char magic[8] = "TFMUSTA";
 
@@ -54,8 +54,7 @@ static int rows_are_sound(const tendonfmu_finger* f, const unsigned char* state)
   for (const finger_row* row = state_rows; row < state_rows + state_row_count; ++row) {
     const size_t parts = row_count(f, row) * row->pointers, lanes = unit_length(f, row->unit);
     for (size_t k = 0; k < parts * lanes; ++k, from += 8) {
-      const size_t part = row->together ? k % parts : k / lanes, lane = row->together ? k / parts : k % lanes;
-      if (!is_within(f, row, part, lane, load_f64(from))) {
+      if (!is_within(f, row, k / lanes, k % lanes, load_f64(from))) {
         return 0;
       }
     }
@@ -102,7 +101,7 @@ static int rests_are_sound(const tendonfmu_finger* f, const unsigned char* state
 static int check_bytes(tendonfmu_finger* f, const unsigned char* from, message_line message) {
   const size_t size = saved_state_size(f), p = f->shape.parameter_count;
   if (memcmp(from, magic, sizeof magic) != 0 || load_u32(from + 8) != STATE_VERSION) {
-    return message_write(message, "not a saved state of this version: it does not begin with \"TFMUSTA\" and 3");
+    return message_write(message, "not a saved state of this version: it does not begin with \"TFMUSTA\" and 4");
   }
   if (load_u32(from + 12) != 0 || load_u64(from + 16) != size || load_u64(from + 32) != f->image_id) {
     return message_write(message, "saved state of another finger: size or model image differ");

@@ -7,6 +7,7 @@
 #include "friction_elements.h"
 #include "friction_law.h"
 #include "kernel_choice.h"
+#include "sensor_watch.h"
 
 /* Fc + (Fs − Fc)·exp(−|v|/vs) + Fv·|v| of some laws of a view, from a lane on; exponent(v) is the smooth part of
  * eq. (1) */
@@ -356,5 +357,8 @@ static void one_minus_exponentials(const double* x, double* values, size_t count
   }
 }
 
-#define STEP_KERNEL(name) \
-  { name, one_minus_exponentials, multiply, tendon_velocities, find_friction, remember_slots, restart_rests }
+#define STEP_KERNEL(name)                                                                                    \
+  {                                                                                                          \
+    name, one_minus_exponentials, multiply, tendon_velocities, watch_tendons, find_friction, remember_slots, \
+        restart_rests                                                                                        \
+  }

@@ -3,6 +3,14 @@
 
 #include "finger_memory.h"
 
+/* What sensor_fault finds of all tendons, a bit each. */
+typedef struct sensor_findings {
+  uint64_t jumps;             /* of f0 */
+  uint64_t forces, positions; /* stand, and contradict the spring */
+  uint64_t stands;            /* f0, whether it does or not */
+  uint64_t recovers;
+} sensor_findings;
+
 /* What of a sample is computed on lanes side by side. */
 struct step_kernel {
   const char* name;
@@ -12,6 +20,9 @@ struct step_kernel {
   void (*multiply)(const tendonfmu_finger* finger, const double* matrix, const double* x, double* product);
   /* eq. (5), from the joint velocities in the last row of velocity [n × M + N] */
   void (*tendon_velocities)(const tendonfmu_finger* finger, double* velocity);
+  /* What sensor_fault remembers of all tendons, from the sample before in scratch to this one, but for faults that
+   * begin; angle [n] rad: as all tendons or the sensors have it */
+  sensor_findings (*watch_tendons)(const tendonfmu_finger* finger, const double* angle, double time, double step);
   /* F of every slot, forces, and T of eq. (10), in scratch; returns whether any slot comes to rest or begins to move */
   int (*find_friction)(tendonfmu_finger* finger);
   /* Fig. 5 for every slot, after its transitions: the side of what moves, the time of what rests */
