@@ -246,8 +246,8 @@ typedef struct finger_scratch {
   double *slip_torque, *limit;       /* [N] friction of eq. (10), all that it can be: B, N·m */
   double* motor_load;                /* [N] x, N·m */
   double* unknown;                   /* [N] max(V, W) before this sample, N·m */
-  double* young;                     /* [N] of band_find_shares() */
-  band_shares shares;                /* of the last step */
+  double* young;                     /* [N] of a mean that began with this joint's, instead of those in shares */
+  band_shares* shares;               /* of the last step */
   /* with sensor_fault only */
   sensor_memory sensor;     /* as in the state, after this sample */
   double* inverse_routing;  /* [n × M] R⁺ of the rows in use */

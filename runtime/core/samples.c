@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "contact_place.h"
+#include "kernel_choice.h"
 #include "sensor_fault.h"
 
 enum { MOST_ROWS = 4 };
@@ -102,9 +103,13 @@ static void give_deviations(double* to, const double* variance, size_t count, si
 /* 0 without contact.bands */
 static void give_terms(double* to, const tendonfmu_finger* f, size_t row) {
   for (size_t j = 0; to && j < f->joints; ++j) {
-    const band_terms none = {{{0.0}}}, terms = f->derived.settings.has_bands ? find_band_terms(bands_of(f, j)) : none;
+    _Alignas(32) double terms[BAND_TERMS * BANDS] = {0.0};
+    if (f->derived.settings.has_bands) {
+      size_t band;
+      f->kernel->weigh_bands(bands_of(f, j), f->derived.band_square + j * BANDS * BAND_NUMBERS, terms, &band);
+    }
     for (size_t k = 0; k < BANDS * BAND_TERMS; ++k) {
-      to[(row * f->joints + j) * BANDS * BAND_TERMS + k] = terms.of[k % BAND_TERMS][k / BAND_TERMS];
+      to[(row * f->joints + j) * BANDS * BAND_TERMS + k] = terms[k % BAND_TERMS * BANDS + k / BAND_TERMS];
     }
   }
 }

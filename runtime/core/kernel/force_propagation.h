@@ -2,6 +2,7 @@
  * behind them, and the torques they make, eqs. (6)-(10); sums over the tendons, eqs. (2) to (5). */
 #pragma once
 
+#include "band_watch.h"
 #include "exponential.h"
 #include "finger_memory.h"
 #include "friction_elements.h"
@@ -357,8 +358,8 @@ static void one_minus_exponentials(const double* x, double* values, size_t count
   }
 }
 
-#define STEP_KERNEL(name)                                                                                    \
-  {                                                                                                          \
-    name, one_minus_exponentials, multiply, tendon_velocities, watch_tendons, find_friction, remember_slots, \
-        restart_rests                                                                                        \
+#define STEP_KERNEL(name)                                                                                \
+  {                                                                                                      \
+    name, one_minus_exponentials, multiply, tendon_velocities, watch_tendons, follow_bands, weigh_bands, \
+        find_friction, remember_slots, restart_rests                                                     \
   }
