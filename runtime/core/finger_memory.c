@@ -122,10 +122,9 @@ static const finger_row prepared_rows[] = {
     {ROW(derived.load_arm), .unit = OF_MATRIX, .when = WITH_BANDS},
     {ROWS(derived.links.axis, derived.links.tip), .unit = OF_JOINTS, .count = 3, .when = WITH_LINKS},
     {ROW(derived.axis_cosine), .unit = OF_JOINTS, .count = MODEL_MAX_JOINTS, .when = WITH_EXTENSIONS},
-    {ROW(memory.remembers), .unit = OF_SLOTS, .when = WITH_MEMORY},
+    {ROWS(memory.remembers, memory.sections), .unit = OF_SLOTS, .when = WITH_MEMORY},
     {ROWS(memory.element[0].share, memory.element[0].soft), .unit = OF_SLOTS, .when = WITH_MEMORY},
     {ROWS(memory.element[1].share, memory.element[1].soft), .unit = OF_SLOTS, .when = WITH_TWO_ELEMENTS},
-    {ROW(memory.sections), .unit = OF_SLOTS, .when = WITH_CORDS},
 };
 
 static const finger_row other_rows[] = {

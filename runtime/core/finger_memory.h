@@ -74,7 +74,7 @@ typedef struct friction_memory {
   int relaxes;       /* some place has a relaxation time */
   double step;       /* that kept, stiff, soft are of, s */
   double* remembers; /* [n × M + N] 1 or 0 */
-  double* sections;  /* [n × M + N] S, of the cord from a level to the tendon's end; with cord_stretch only */
+  double* sections;  /* [n × M + N] S, of the cord from a level to the tendon's end */
   friction_element element[MODEL_MAX_ELEMENTS];
 } friction_memory;
 

@@ -66,14 +66,15 @@ static void set_element(tendonfmu_finger* f, size_t e, size_t slot, effect_place
   f->memory.relaxes |= numbers[RELAXATION_TIME] > 0.0;
 }
 
-/* the rows that hold at a slot, at most two */
+/* the rows that hold at a slot, at most two; none where the tendon moves no joint from there on */
 static void find_elements(tendonfmu_finger* f, size_t slot) {
+  const int turns = slot >= f->joints * f->tendon_lanes || f->memory.sections[slot] > 0.0;
   size_t found = 0;
   int rank = 0;
   double sum = 0.0;
   for (size_t r = 0; r < f->extensions.memory; ++r) {
     const extension_row* row = memory_row(f, r);
-    const int here = row->effect == &effect_presliding ? rank_at(f, row->place, slot) : 0;
+    const int here = turns && row->effect == &effect_presliding ? rank_at(f, row->place, slot) : 0;
     if (here > rank) {
       rank = here;
       found = 0;
@@ -149,9 +150,7 @@ void find_memory(tendonfmu_finger* f) {
     return;
   }
   f->memory.compliance = cord_compliance(f);
-  if (f->shape.stretches) {
-    find_sections(f);
-  }
+  find_sections(f);
   for (size_t slot = 0; slot < f->slots; ++slot) {
     find_elements(f, slot);
   }

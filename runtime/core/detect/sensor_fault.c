@@ -173,7 +173,9 @@ void watch_sensors(tendonfmu_finger* f, double time, double step) {
   _Alignas(32) double spring_end[MODEL_MAX_TENDONS], angle[MODEL_MAX_JOINTS];
   clear_lanes(f->scratch.angle_shift, f->joint_lanes);
   clear_lanes(f->scratch.watch, f->joint_lanes);
-  memcpy(now->fault, f->remembered.sensor.fault, SENSOR_NUMBERS * f->tendon_lanes * sizeof(double));
+  copy_lanes(now->fault, f->remembered.sensor.fault, f->tendon_lanes);
+  copy_lanes(now->fault_since, f->remembered.sensor.fault_since, f->tendon_lanes);
+  copy_lanes(now->unsound_at, f->remembered.sensor.unsound_at, f->tendon_lanes);
   if (by_tendons) {
     find_spring_ends(f, f->scratch.position, f->scratch.force, spring_end);
     f->kernel->multiply(f, f->scratch.inverse_routing, spring_end, angle);

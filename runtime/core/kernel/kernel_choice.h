@@ -20,8 +20,8 @@ struct step_kernel {
   void (*multiply)(const tendonfmu_finger* finger, const double* matrix, const double* x, double* product);
   /* eq. (5), from the joint velocities in the last row of velocity [n × M + N] */
   void (*tendon_velocities)(const tendonfmu_finger* finger, double* velocity);
-  /* What sensor_fault remembers of all tendons, from the sample before in scratch to this one, but for faults that
-   * begin; angle [n] rad: as all tendons or the sensors have it */
+  /* What sensor_fault remembers of all tendons, into scratch, where the faults up to now stand; angle [n] rad: as all
+   * tendons or the sensors have it */
   sensor_findings (*watch_tendons)(const tendonfmu_finger* finger, const double* angle, double time, double step);
   /* The bands of a joint take a sample; any: some joint was in contact at the one before. */
   void (*follow_bands)(band_memory* joint, const band_sample* sample, const band_shares* shares, double young,
