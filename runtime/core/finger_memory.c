@@ -2,7 +2,6 @@
 
 #include "finger_memory.h"
 
-#include <float.h>
 #include <stddef.h>
 #include <string.h>
 
@@ -31,69 +30,69 @@ static void* take(cursor* c, size_t bytes) {
 #define ROWS(first, last) .place = AT(first), .pointers = (AT(last) - AT(first)) / sizeof(double*) + 1
 #define ROW(name)         ROWS(name, name)
 #define SENSORS(memory)   ROWS(memory.fault, memory.joint_side_then)
-#define WITHIN(most)      .low = -(most), .high = (most)
-#define INSTANT           WITHIN(LARGEST_TIME), .spare = 1
-#define FLAG              .high = 1.0, .whole = 1
+#define WITHIN(most)      .low = MINUS | (most), .high = (most)
+#define INSTANT           WITHIN(A_TIME), .spare = 1
+#define FLAG              .high = ONE, .whole = 1
 
 static const finger_row scalars[STATE_SCALARS] = {
     [STATE_INITIALISED] = {FLAG},
-    [STATE_SOURCE] = {.low = 1.0, .high = 3.0, .whole = 1},
+    [STATE_SOURCE] = {.low = ONE, .high = THREE, .whole = 1},
     [STATE_TIME] = {INSTANT},
     [STATE_FIRST_SAMPLE] = {FLAG},
-    [STATE_VELOCITY_GAIN] = {.high = DBL_MAX},
+    [STATE_VELOCITY_GAIN] = {.high = ANY_NUMBER},
     [STATE_CONTACT] = {FLAG},
-    [STATE_ABSORBED] = {.high = LARGEST_SQUARE},
-    [STATE_ABSORBED_BEFORE] = {.high = LARGEST_SQUARE},
+    [STATE_ABSORBED] = {.high = A_SQUARE},
+    [STATE_ABSORBED_BEFORE] = {.high = A_SQUARE},
     [STATE_UNWELL] = {FLAG},
-    [STATE_STEP] = {.high = 2.0 * LARGEST_TIME},
+    [STATE_STEP] = {.high = TWO_TIMES},
 };
 
 /* in the order of sensor_memory */
 static const finger_row sensors[SENSOR_NUMBERS] = {
-    {.high = POSITION_FAILS, .whole = 1},
+    {.high = TWO, .whole = 1},
     {INSTANT},
     {INSTANT},
     {FLAG},
-    {WITHIN(DBL_MAX)},
-    {WITHIN(DBL_MAX)},
-    {WITHIN(DBL_MAX)},
-    {WITHIN(DBL_MAX)},
+    {WITHIN(ANY_NUMBER)},
+    {WITHIN(ANY_NUMBER)},
+    {WITHIN(ANY_NUMBER)},
+    {WITHIN(ANY_NUMBER)},
     {INSTANT},
     {FLAG},
-    {WITHIN(DBL_MAX)},
-    {WITHIN(DBL_MAX)},
-    {WITHIN(DBL_MAX)},
+    {WITHIN(ANY_NUMBER)},
+    {WITHIN(ANY_NUMBER)},
+    {WITHIN(ANY_NUMBER)},
     {INSTANT},
-    {WITHIN(DBL_MAX)},
-    {WITHIN(DBL_MAX)},
+    {WITHIN(ANY_NUMBER)},
+    {WITHIN(ANY_NUMBER)},
 };
 
 const finger_row state_rows[] = {
     {ROW(remembered.scalar), .count = STATE_SCALARS, .parts = scalars},
-    {ROWS(remembered.angle, remembered.bias), .unit = OF_JOINTS, WITHIN(DBL_MAX)},
+    {ROWS(remembered.angle, remembered.bias), .unit = OF_JOINTS, WITHIN(ANY_NUMBER)},
     {ROW(remembered.joint_contact), .unit = OF_JOINTS, FLAG},
-    {ROW(remembered.variance), .unit = OF_JOINTS, .high = LARGEST_SQUARE, .spare = 1},
-    {ROW(remembered.gain), .unit = OF_JOINTS, .high = 1.0, .spare = 1},
-    {ROW(remembered.residual), .unit = OF_JOINTS, WITHIN(DBL_MAX)},
-    {ROW(remembered.level), .unit = OF_JOINTS, .high = LARGEST_SUM},
-    {ROW(remembered.total_variance), .unit = OF_JOINTS, .high = DBL_MAX, .spare = 1},
-    {ROW(remembered.force), .unit = OF_TENDONS, WITHIN(DBL_MAX)},
+    {ROW(remembered.variance), .unit = OF_JOINTS, .high = A_SQUARE, .spare = 1},
+    {ROW(remembered.gain), .unit = OF_JOINTS, .high = ONE, .spare = 1},
+    {ROW(remembered.residual), .unit = OF_JOINTS, WITHIN(ANY_NUMBER)},
+    {ROW(remembered.level), .unit = OF_JOINTS, .high = A_SUM},
+    {ROW(remembered.total_variance), .unit = OF_JOINTS, .high = ANY_NUMBER, .spare = 1},
+    {ROW(remembered.force), .unit = OF_TENDONS, WITHIN(ANY_NUMBER)},
     {ROW(remembered.slack), .unit = OF_TENDONS, FLAG},
     {ROW(remembered.moving), .unit = OF_SLOTS, FLAG},
-    {ROW(remembered.side), .unit = OF_SLOTS, WITHIN(1.0), .whole = 1},
-    {ROW(remembered.event), .unit = OF_SLOTS, .low = -3.0, .high = 1.0, .whole = 1},
-    {ROW(remembered.stuck_since), .unit = OF_SLOTS, .low = -LARGEST_TIME, .high = LARGEST_SQUARE, .spare = 1},
+    {ROW(remembered.side), .unit = OF_SLOTS, WITHIN(ONE), .whole = 1},
+    {ROW(remembered.event), .unit = OF_SLOTS, .low = MINUS | THREE, .high = ONE, .whole = 1},
+    {ROW(remembered.stuck_since), .unit = OF_SLOTS, .low = MINUS | A_TIME, .high = A_SQUARE, .spare = 1},
     {ROW(remembered.last_stuck), .unit = OF_SLOTS, INSTANT},
-    {ROW(remembered.jumped), .unit = OF_JOINTS, .when = WITH_BANDS, WITHIN(LARGEST_SUM)},
+    {ROW(remembered.jumped), .unit = OF_JOINTS, .when = WITH_BANDS, WITHIN(A_SUM)},
     {ROW(remembered.bands), .unit = OF_JOINTS, .count = sizeof(band_memory) / sizeof(double), .when = WITH_BANDS,
-     WITHIN(2.0 * LARGEST_SUM), .spare = 1},
+     WITHIN(TWO_SUMS), .spare = 1},
     {SENSORS(remembered.sensor), .unit = OF_TENDONS, .when = WITH_SENSOR_FAULT, .parts = sensors},
-    {ROW(remembered.watch), .unit = OF_JOINTS, .when = WITH_SENSOR_FAULT, .high = JOINT_BEGINS_ANEW, .whole = 1},
-    {ROW(remembered.element), .unit = OF_ELEMENTS, .count = 2, .when = WITH_MEMORY, WITHIN(LARGEST_SUM), .spare = 1},
+    {ROW(remembered.watch), .unit = OF_JOINTS, .when = WITH_SENSOR_FAULT, .high = TWO, .whole = 1},
+    {ROW(remembered.element), .unit = OF_ELEMENTS, .count = 2, .when = WITH_MEMORY, WITHIN(A_SUM), .spare = 1},
     {ROWS(remembered.by_turning, remembered.by_limit), .unit = OF_SLOTS, .count = 2, .when = WITH_MEMORY,
-     WITHIN(DBL_MAX), .spare = 1},
-    {ROW(remembered.tension), .unit = OF_SLOTS, .count = 2, .when = WITH_CORDS, WITHIN(DBL_MAX), .spare = 1},
-    {ROW(remembered.extension), .unit = OF_EXTENSIONS, WITHIN(DBL_MAX), .spare = 1},
+     WITHIN(ANY_NUMBER), .spare = 1},
+    {ROW(remembered.tension), .unit = OF_SLOTS, .count = 2, .when = WITH_CORDS, WITHIN(ANY_NUMBER), .spare = 1},
+    {ROW(remembered.extension), .unit = OF_EXTENSIONS, WITHIN(ANY_NUMBER), .spare = 1},
 };
 const size_t state_row_count = sizeof state_rows / sizeof state_rows[0];
 

@@ -197,16 +197,32 @@ typedef enum row_condition {
   WITH_CORDS /* that stretch */
 } row_condition;
 
+/* What a number in a saved state may be at most or, with MINUS, at least. */
+typedef enum state_bound {
+  ZERO,
+  ONE,
+  TWO,
+  THREE,
+  A_TIME, /* LARGEST_TIME, … */
+  TWO_TIMES,
+  A_SUM,
+  TWO_SUMS,
+  A_SQUARE,
+  ANY_NUMBER, /* that is finite */
+  MINUS = 0x80
+} state_bound;
+
 /* Rows of numbers, each with a pointer in struct tendonfmu_finger: all of its memory follows from such. */
 typedef struct finger_row {
-  uint16_t place, pointers; /* offset of the first pointer; how many side by side */
-  uint16_t count;           /* of the unit; 0: 1 */
-  unsigned char unit;       /* row_unit */
-  unsigned char when;       /* row_condition */
+  uint16_t place;         /* offset of the first pointer */
+  unsigned char pointers; /* how many side by side */
+  unsigned char count;    /* of the unit; 0: 1 */
+  unsigned char unit;     /* row_unit */
+  unsigned char when;     /* row_condition */
   /* what may stand in a saved state */
-  unsigned char whole; /* whole numbers only */
-  unsigned char spare; /* lanes that stand for nothing are tracked along; else they hold 0 */
-  double low, high;
+  unsigned char whole;            /* whole numbers only */
+  unsigned char spare;            /* lanes that stand for nothing are tracked along; else they hold 0 */
+  unsigned char low, high;        /* state_bound */
   const struct finger_row* parts; /* [count] where each has limits of its own */
 } finger_row;
 
@@ -374,8 +390,21 @@ size_t finger_memory_size(const model_shape* shape);
  */
 tendonfmu_finger* finger_lay_out(const model_shape* shape, void* memory, uint32_t** words);
 
-/* --- the laws in force at a slot (slot_view.c): the side by the sign of its velocity, the working points by the joint
- * angle --- */
+/* --- what follows from the parameters (derived_numbers.c), the one place where it is computed -----------------------
+ */
+
+/* Recomputes finger->derived from finger->parameters: at creation, and after parameters were written or restored.
+ * R⁺ is only computed again where `routing_changed`. */
+void derive_numbers(tendonfmu_finger* finger, int routing_changed);
+
+/* Copies parameters and all that follows from them, of a finger of the same image. */
+void take_prepared_numbers(tendonfmu_finger* finger, const tendonfmu_finger* prepared);
+
+/* Makes the next sample look at all laws anew. */
+void forget_views(tendonfmu_finger* finger);
+
+/* --- the laws in force at a slot (derived_numbers.c): the side by the sign of its velocity, the working points by the
+ * joint angle --- */
 
 /* Fills the view of `count` slots from `slot` on: its lanes from slot % 4 on.
  *   angle         of the joint before (q_0 = 0); of no meaning to the slots of joints

@@ -2,10 +2,10 @@
 
 #include "step.h"
 
+#include <float.h>
 #include <string.h>
 
 #include "bytes.h"
-#include "derived_numbers.h"
 #include "parameters.h"
 #include "sensor_fault.h"
 
@@ -41,11 +41,17 @@ static int is_in_use(const tendonfmu_finger* f, row_unit unit, size_t i) {
   }
 }
 
+static double bound_of(unsigned char bound) {
+  static const double size[] = {
+      0.0, 1.0, 2.0, 3.0, LARGEST_TIME, 2.0 * LARGEST_TIME, LARGEST_SUM, 2.0 * LARGEST_SUM, LARGEST_SQUARE, DBL_MAX};
+  return bound & MINUS ? -size[bound & ~MINUS] : size[bound];
+}
+
 /* whether number `part` of a row in lane i is within limits; those of lanes that stand for nothing are 0 */
 static int is_within(const tendonfmu_finger* f, const finger_row* row, size_t part, size_t i, double value) {
   const finger_row* limits = row->parts ? row->parts + part : row;
   const int tied = !limits->spare && !is_in_use(f, row->unit, i);
-  const double low = tied ? 0.0 : limits->low, high = tied ? 0.0 : limits->high;
+  const double low = tied ? 0.0 : bound_of(limits->low), high = tied ? 0.0 : bound_of(limits->high);
   return value >= low && value <= high && (!limits->whole || value == (double)(int)value); /* NaN is neither */
 }
 
