@@ -123,7 +123,10 @@ static int all_finite(const tendonfmu_finger* f) {
     }
     probe += 0.0 * (1e160 * sum) + (0.0 * s->angle[j] + 0.0 * velocity[j]); /* infinite above 1.8e148 */
   }
-  return probe == 0.0 && (!f->derived.settings.watches_sensors || sensors_are_finite(f));
+  for (size_t i = 0; f->derived.settings.watches_sensors && i < f->tendons; ++i) {
+    probe += 0.0 * (1e30 * s->sensor.joint_side[i]); /* nor the force of a spring there */
+  }
+  return probe == 0.0;
 }
 
 /* --- memory ---------------------------------------------------------------------------------------------------------

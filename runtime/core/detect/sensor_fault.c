@@ -173,9 +173,7 @@ void watch_sensors(tendonfmu_finger* f, double time, double step) {
   _Alignas(32) double spring_end[MODEL_MAX_TENDONS], angle[MODEL_MAX_JOINTS];
   clear_lanes(f->scratch.angle_shift, f->joint_lanes);
   clear_lanes(f->scratch.watch, f->joint_lanes);
-  copy_lanes(now->fault, f->remembered.sensor.fault, f->tendon_lanes);
-  copy_lanes(now->fault_since, f->remembered.sensor.fault_since, f->tendon_lanes);
-  copy_lanes(now->unsound_at, f->remembered.sensor.unsound_at, f->tendon_lanes);
+  copy_lanes(now->fault, f->remembered.sensor.fault, 3 * f->tendon_lanes); /* fault_since and unsound_at, too */
   if (by_tendons) {
     find_spring_ends(f, f->scratch.position, f->scratch.force, spring_end);
     f->kernel->multiply(f, f->scratch.inverse_routing, spring_end, angle);
@@ -196,14 +194,6 @@ void watch_sensors(tendonfmu_finger* f, double time, double step) {
     find_blind_joints(f, now->fault, f->scratch.watch);
     f->scratch.unwell = is_unwell(f);
   }
-}
-
-int sensors_are_finite(const tendonfmu_finger* f) {
-  double probe = 0.0;
-  for (size_t i = 0; i < f->tendons; ++i) {
-    probe += 0.0 * (1e30 * f->scratch.sensor.joint_side[i]);
-  }
-  return probe == 0.0;
 }
 
 double mean_sound_force(const tendonfmu_finger* f) {

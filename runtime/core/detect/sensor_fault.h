@@ -31,9 +31,6 @@ void watch_sensors(tendonfmu_finger* finger, double time, double step);
 /* Mean |f0| over the tendons whose force does not fail, over all where every one does. */
 double mean_sound_force(const tendonfmu_finger* finger);
 
-/* 0 where w is so large that its spring's force would not be finite. */
-int sensors_are_finite(const tendonfmu_finger* finger);
-
 /* Before T_eff: joints that are watched again begin as at the first sample, b_eff = τ − T. */
 void begin_bias_anew(tendonfmu_finger* finger);
 
