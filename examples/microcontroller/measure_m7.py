@@ -2,7 +2,7 @@
 
     python examples/microcontroller/measure_m7.py [FOLDER]
 
-prints the tables of docs/guide/microcontroller.md. Needs arm-none-eabi-gcc, newlib and qemu-system-arm.
+prints the table of docs/guide/microcontroller.md. Needs arm-none-eabi-gcc, newlib and qemu-system-arm.
 """
 
 from __future__ import annotations
@@ -99,47 +99,41 @@ def symbols(program: Path) -> set[str]:
 
 
 def flash(program: Path) -> Counter[str]:
-    """Return bytes of code and constants by the object files they come from; those of the core by `core/NAME`."""
+    """Return bytes of code and constants: of the core with the loop, of the image, of libraries."""
     text = (program.parent / "finger_loop.map").read_text().partition("Linker script and memory map")[2]
     sizes: Counter[str] = Counter()
-    for size, file in re.findall(r"^ \.(?:text|rodata)\S*\s+0x\w+\s+(0x\w+) (\S+)$", text, re.MULTILINE):
-        core = re.search(r"libtendonfmu\.a\((\w+)\.c", file)
-        sizes[f"core/{core[1]}" if core else "image and loop" if "finger_loop.c" in file else "libraries"] += int(
-            size, 16
-        )
+    for section, size, file in re.findall(r"^ \.(?:text|rodata)(\S*)\s+0x\w+\s+(0x\w+) (\S+)$", text, re.MULTILINE):
+        part = "image" if section.endswith("_image") else "core" if "ltrans" in file else "libraries"
+        sizes[part] += int(size, 16)
     return sizes
 
 
 HEAD = (
-    *("finger", "FPU", "core, bytes", "image and loop", "libraries", "RAM of the finger", "stack to place it"),
+    *("finger", "FPU", "core and loop", "image", "libraries", "RAM of the finger", "stack to place it"),
     *("stack of a step", "instructions a step", "most"),
 )
 
 
-def line(finger: Path, recording: Path, fpu: str, folder: Path) -> tuple[list[object], Counter[str]]:
-    """A row of the table, and what the flash holds."""
+def line(finger: Path, recording: Path, fpu: str, folder: Path) -> list[object]:
+    """Return a row of the table."""
     program = build(finger, fpu, folder)
     found, parts = run(program, finger, recording), flash(program)
-    core = sum(size for name, size in parts.items() if name.startswith("core/"))
     return [
-        *(finger.stem, FPUS[fpu], core, parts["image and loop"], parts["libraries"]),
+        *(finger.stem, FPUS[fpu], parts["core"], parts["image"], parts["libraries"]),
         *(found.memory, found.stack_to_place, found.stack_of_step),
         *(round(found.instructions / found.samples), found.most_instructions),
-    ], parts
+    ]
 
 
 def main(folder: Path) -> None:
-    """Print the tables."""
+    """Print the table."""
     rows: list[Sequence[object]] = [HEAD, ["---"] * 2 + ["---:"] * (len(HEAD) - 2)]
-    cores = {}
     for fpu in FPUS:
         for finger, recording in CASES:
-            row, cores[fpu] = line(finger, recording, fpu, folder / fpu / finger.stem)
+            row = line(finger, recording, fpu, folder / fpu / finger.stem)
             rows.append([f"{cell:,}" if isinstance(cell, int) else cell for cell in row])
     for each in rows:
         print("|", " | ".join(map(str, each)), "|")
-    for fpu, parts in cores.items():
-        print(f"\n{FPUS[fpu]}:", ", ".join(f"{name} {size:,}" for name, size in parts.most_common()))
 
 
 if __name__ == "__main__":

@@ -350,7 +350,7 @@ static void linearise_mean(linearisation* l, const double* direction) {
   double sound[MODEL_MAX_TENDONS];
   const int watches = f->derived.settings.watches_sensors;
   if (watches) {
-    weigh_forces(f, sensors_in(f->remembered.sensor), sound);
+    weigh_forces(f, f->remembered.sensor.fault, sound);
   }
   for (size_t i = 0; i < f->tendons; ++i) {
     const double force = f->remembered.force[i], slope = force < 0.0 ? -direction[i] : direction[i];

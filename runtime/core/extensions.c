@@ -261,9 +261,3 @@ void add_extension_torques(tendonfmu_finger* f) {
     row->effect->torque(row->place, row->parameters, &f->scratch.sample, row->next, f->scratch.friction);
   }
 }
-
-void remember_extensions(tendonfmu_finger* f) {
-  if (f->shape.extension_memory) {
-    memcpy(f->remembered.extension, f->scratch.extension, f->shape.extension_memory * sizeof(double));
-  }
-}

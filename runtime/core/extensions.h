@@ -54,9 +54,6 @@ void grip_jumps(tendonfmu_finger* finger);
 /* Adds the torques to T, in scratch. */
 void add_extension_torques(tendonfmu_finger* finger);
 
-/* The sample is accepted. */
-void remember_extensions(tendonfmu_finger* finger);
-
 /* --- of the sample last remembered -------------------------------------------------------------------------------- */
 
 /* The sample as torque rows see it. */
@@ -76,9 +73,6 @@ void find_memory(tendonfmu_finger* finger);
 
 /* The travel of every place in this sample, and what relaxation makes of it; the kinematics are known. */
 void turn_places(tendonfmu_finger* finger, double step);
-
-/* The sample is accepted. */
-void remember_elements(tendonfmu_finger* finger);
 
 /* Friction as a torque where its places have a memory: z of a row of this size (N), into what it will remember; at a
  * joint its size (N·m), into the limit there. */

@@ -8,7 +8,6 @@
 #include <string.h>
 
 #include "bytes.h"
-#include "derived_numbers.h"
 #include "kernel_choice.h"
 #include "message.h"
 #include "parameters.h"

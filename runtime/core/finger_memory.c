@@ -2,7 +2,6 @@
 
 #include "finger_memory.h"
 
-#include <float.h>
 #include <stddef.h>
 #include <string.h>
 
@@ -30,72 +29,82 @@ static void* take(cursor* c, size_t bytes) {
 #define AT(name)          offsetof(tendonfmu_finger, name)
 #define ROWS(first, last) .place = AT(first), .pointers = (AT(last) - AT(first)) / sizeof(double*) + 1
 #define ROW(name)         ROWS(name, name)
-#define WITHIN(most)      .low = -(most), .high = (most)
-#define INSTANT           WITHIN(LARGEST_TIME), .spare = 1
-#define FLAG              .high = 1.0, .whole = 1
+#define SENSORS(memory)   ROWS(memory.fault, memory.joint_side_then)
+#define WITHIN(most)      .low = MINUS | (most), .high = (most)
+#define INSTANT           WITHIN(A_TIME), .spare = 1
+#define FLAG              .high = ONE, .whole = 1
 
 static const finger_row scalars[STATE_SCALARS] = {
     [STATE_INITIALISED] = {FLAG},
-    [STATE_SOURCE] = {.low = 1.0, .high = 3.0, .whole = 1},
+    [STATE_SOURCE] = {.low = ONE, .high = THREE, .whole = 1},
     [STATE_TIME] = {INSTANT},
     [STATE_FIRST_SAMPLE] = {FLAG},
-    [STATE_VELOCITY_GAIN] = {.high = DBL_MAX},
+    [STATE_VELOCITY_GAIN] = {.high = ANY_NUMBER},
     [STATE_CONTACT] = {FLAG},
-    [STATE_ABSORBED] = {.high = LARGEST_SQUARE},
-    [STATE_ABSORBED_BEFORE] = {.high = LARGEST_SQUARE},
+    [STATE_ABSORBED] = {.high = A_SQUARE},
+    [STATE_ABSORBED_BEFORE] = {.high = A_SQUARE},
     [STATE_UNWELL] = {FLAG},
-    [STATE_STEP] = {.high = 2.0 * LARGEST_TIME},
+    [STATE_STEP] = {.high = TWO_TIMES},
 };
 
 /* in the order of sensor_memory */
 static const finger_row sensors[SENSOR_NUMBERS] = {
-    {.high = POSITION_FAILS, .whole = 1},
+    {.high = TWO, .whole = 1},
     {INSTANT},
     {INSTANT},
     {FLAG},
-    {WITHIN(DBL_MAX)},
-    {WITHIN(DBL_MAX)},
-    {WITHIN(DBL_MAX)},
-    {WITHIN(DBL_MAX)},
+    {WITHIN(ANY_NUMBER)},
+    {WITHIN(ANY_NUMBER)},
+    {WITHIN(ANY_NUMBER)},
+    {WITHIN(ANY_NUMBER)},
     {INSTANT},
     {FLAG},
-    {WITHIN(DBL_MAX)},
-    {WITHIN(DBL_MAX)},
-    {WITHIN(DBL_MAX)},
+    {WITHIN(ANY_NUMBER)},
+    {WITHIN(ANY_NUMBER)},
+    {WITHIN(ANY_NUMBER)},
     {INSTANT},
-    {WITHIN(DBL_MAX)},
-    {WITHIN(DBL_MAX)},
+    {WITHIN(ANY_NUMBER)},
+    {WITHIN(ANY_NUMBER)},
 };
 
 const finger_row state_rows[] = {
     {ROW(remembered.scalar), .count = STATE_SCALARS, .parts = scalars},
-    {ROWS(remembered.angle, remembered.bias), .unit = OF_JOINTS, WITHIN(DBL_MAX)},
+    {ROWS(remembered.angle, remembered.bias), .unit = OF_JOINTS, WITHIN(ANY_NUMBER)},
     {ROW(remembered.joint_contact), .unit = OF_JOINTS, FLAG},
-    {ROW(remembered.variance), .unit = OF_JOINTS, .high = LARGEST_SQUARE, .spare = 1},
-    {ROW(remembered.gain), .unit = OF_JOINTS, .high = 1.0, .spare = 1},
-    {ROW(remembered.residual), .unit = OF_JOINTS, WITHIN(DBL_MAX)},
-    {ROW(remembered.level), .unit = OF_JOINTS, .high = LARGEST_SUM},
-    {ROW(remembered.total_variance), .unit = OF_JOINTS, .high = DBL_MAX, .spare = 1},
-    {ROW(remembered.force), .unit = OF_TENDONS, WITHIN(DBL_MAX)},
+    {ROW(remembered.variance), .unit = OF_JOINTS, .high = A_SQUARE, .spare = 1},
+    {ROW(remembered.gain), .unit = OF_JOINTS, .high = ONE, .spare = 1},
+    {ROW(remembered.residual), .unit = OF_JOINTS, WITHIN(ANY_NUMBER)},
+    {ROW(remembered.level), .unit = OF_JOINTS, .high = A_SUM},
+    {ROW(remembered.total_variance), .unit = OF_JOINTS, .high = ANY_NUMBER, .spare = 1},
+    {ROW(remembered.force), .unit = OF_TENDONS, WITHIN(ANY_NUMBER)},
     {ROW(remembered.slack), .unit = OF_TENDONS, FLAG},
     {ROW(remembered.moving), .unit = OF_SLOTS, FLAG},
-    {ROW(remembered.side), .unit = OF_SLOTS, WITHIN(1.0), .whole = 1},
-    {ROW(remembered.event), .unit = OF_SLOTS, .low = -3.0, .high = 1.0, .whole = 1},
-    {ROW(remembered.stuck_since), .unit = OF_SLOTS, .low = -LARGEST_TIME, .high = LARGEST_SQUARE, .spare = 1},
+    {ROW(remembered.side), .unit = OF_SLOTS, WITHIN(ONE), .whole = 1},
+    {ROW(remembered.event), .unit = OF_SLOTS, .low = MINUS | THREE, .high = ONE, .whole = 1},
+    {ROW(remembered.stuck_since), .unit = OF_SLOTS, .low = MINUS | A_TIME, .high = A_SQUARE, .spare = 1},
     {ROW(remembered.last_stuck), .unit = OF_SLOTS, INSTANT},
-    {ROW(remembered.jumped), .unit = OF_JOINTS, .when = WITH_BANDS, WITHIN(LARGEST_SUM)},
+    {ROW(remembered.jumped), .unit = OF_JOINTS, .when = WITH_BANDS, WITHIN(A_SUM)},
     {ROW(remembered.bands), .unit = OF_JOINTS, .count = sizeof(band_memory) / sizeof(double), .when = WITH_BANDS,
-     WITHIN(2.0 * LARGEST_SUM), .spare = 1},
-    {ROW(remembered.sensor), .unit = OF_TENDONS, .count = SENSOR_NUMBERS, .when = WITH_SENSOR_FAULT, .parts = sensors,
-     .together = 1},
-    {ROW(remembered.watch), .unit = OF_JOINTS, .when = WITH_SENSOR_FAULT, .high = JOINT_BEGINS_ANEW, .whole = 1},
-    {ROW(remembered.element), .unit = OF_ELEMENTS, .count = 2, .when = WITH_MEMORY, WITHIN(LARGEST_SUM), .spare = 1},
+     WITHIN(TWO_SUMS), .spare = 1},
+    {SENSORS(remembered.sensor), .unit = OF_TENDONS, .when = WITH_SENSOR_FAULT, .parts = sensors},
+    {ROW(remembered.watch), .unit = OF_JOINTS, .when = WITH_SENSOR_FAULT, .high = TWO, .whole = 1},
+    {ROW(remembered.element), .unit = OF_ELEMENTS, .count = 2, .when = WITH_MEMORY, WITHIN(A_SUM), .spare = 1},
     {ROWS(remembered.by_turning, remembered.by_limit), .unit = OF_SLOTS, .count = 2, .when = WITH_MEMORY,
-     WITHIN(DBL_MAX), .spare = 1},
-    {ROW(remembered.tension), .unit = OF_SLOTS, .count = 2, .when = WITH_CORDS, WITHIN(DBL_MAX), .spare = 1},
-    {ROW(remembered.extension), .unit = OF_EXTENSIONS, WITHIN(DBL_MAX), .spare = 1},
+     WITHIN(ANY_NUMBER), .spare = 1},
+    {ROW(remembered.tension), .unit = OF_SLOTS, .count = 2, .when = WITH_CORDS, WITHIN(ANY_NUMBER), .spare = 1},
+    {ROW(remembered.extension), .unit = OF_EXTENSIONS, WITHIN(ANY_NUMBER), .spare = 1},
 };
 const size_t state_row_count = sizeof state_rows / sizeof state_rows[0];
+
+/* what the last of these become with this sample, in the same order */
+static const finger_row next_rows[] = {
+    {SENSORS(scratch.sensor), .unit = OF_TENDONS, .when = WITH_SENSOR_FAULT},
+    {ROW(scratch.watch), .unit = OF_JOINTS, .when = WITH_SENSOR_FAULT},
+    {ROW(scratch.element), .unit = OF_ELEMENTS, .count = 2, .when = WITH_MEMORY},
+    {ROWS(scratch.by_turning, scratch.by_limit), .unit = OF_SLOTS, .count = 2, .when = WITH_MEMORY},
+    {ROW(scratch.tension), .unit = OF_SLOTS, .count = 2, .when = WITH_CORDS},
+    {ROW(scratch.extension), .unit = OF_EXTENSIONS},
+};
 
 /* the parameters in force and all that follows from them: one run, which another finger may take over */
 static const finger_row prepared_rows[] = {
@@ -112,30 +121,24 @@ static const finger_row prepared_rows[] = {
     {ROW(derived.load_arm), .unit = OF_MATRIX, .when = WITH_BANDS},
     {ROWS(derived.links.axis, derived.links.tip), .unit = OF_JOINTS, .count = 3, .when = WITH_LINKS},
     {ROW(derived.axis_cosine), .unit = OF_JOINTS, .count = MODEL_MAX_JOINTS, .when = WITH_EXTENSIONS},
-    {ROW(memory.remembers), .unit = OF_SLOTS, .when = WITH_MEMORY},
+    {ROWS(memory.remembers, memory.sections), .unit = OF_SLOTS, .when = WITH_MEMORY},
     {ROWS(memory.element[0].share, memory.element[0].soft), .unit = OF_SLOTS, .when = WITH_MEMORY},
     {ROWS(memory.element[1].share, memory.element[1].soft), .unit = OF_SLOTS, .when = WITH_TWO_ELEMENTS},
-    {ROW(memory.sections), .unit = OF_SLOTS, .when = WITH_CORDS},
 };
 
 static const finger_row other_rows[] = {
     {ROWS(start, candidate), .unit = OF_PARAMETERS},
-    {ROW(scratch.extension), .unit = OF_EXTENSIONS},
     {ROWS(scratch.grip, scratch.bias_grip), .unit = OF_SLOTS, .when = WITH_EXTENSIONS},
     {ROW(scratch.travelled), .unit = OF_SLOTS, .when = WITH_MEMORY},
     {ROW(scratch.own_limit), .unit = OF_JOINTS, .when = WITH_MEMORY},
-    {ROW(scratch.element), .unit = OF_ELEMENTS, .count = 2, .when = WITH_MEMORY},
-    {ROWS(scratch.by_turning, scratch.by_limit), .unit = OF_SLOTS, .count = 2, .when = WITH_MEMORY},
-    {ROW(scratch.tension), .unit = OF_SLOTS, .count = 2, .when = WITH_CORDS},
     {ROWS(scratch.force, scratch.slack), .unit = OF_TENDONS},
     {ROWS(scratch.angle, scratch.residual_variance), .unit = OF_JOINTS},
     {ROWS(scratch.edge, scratch.force_between), .unit = OF_MATRIX},
-    {ROWS(scratch.slip_torque, scratch.unknown), .unit = OF_JOINTS, .when = WITH_BANDS},
+    {ROWS(scratch.slip_torque, scratch.young), .unit = OF_JOINTS, .when = WITH_BANDS},
     {ROWS(scratch.edge_limit, scratch.pulley_limit), .unit = OF_SLOTS, .when = WITH_BANDS},
-    {ROW(scratch.sensor), .unit = OF_TENDONS, .count = SENSOR_NUMBERS, .when = WITH_SENSOR_FAULT},
     {ROW(scratch.inverse_routing), .unit = OF_MATRIX, .when = WITH_SENSOR_FAULT},
     {ROWS(scratch.leverage, scratch.row_in_use), .unit = OF_TENDONS, .when = WITH_SENSOR_FAULT},
-    {ROWS(scratch.watch, scratch.angle_shift), .unit = OF_JOINTS, .when = WITH_SENSOR_FAULT},
+    {ROW(scratch.angle_shift), .unit = OF_JOINTS, .when = WITH_SENSOR_FAULT},
     {ROW(scratch.velocity), .unit = OF_SLOTS},
 };
 
@@ -206,14 +209,15 @@ static void lay_out_prepared(tendonfmu_finger* f, cursor* c) {
   f->prepared_bytes = c->used - begin;
 }
 
-static void lay_out_state(tendonfmu_finger* f, cursor* c) {
+/* rows without gaps; returns how many numbers */
+static size_t place_run(tendonfmu_finger* f, cursor* c, const finger_row* rows, size_t count, double** run) {
   take(c, 0); /* to where a row begins */
   const size_t begin = c->used;
-  c->row_bytes = sizeof(double); /* one run */
-  place_rows(f, c, state_rows, state_row_count);
+  *run = (double*)(void*)(c->base ? c->base + begin : NULL);
+  c->row_bytes = sizeof(double);
+  place_rows(f, c, rows, count);
   c->row_bytes = ROW_BYTES;
-  f->state = f->remembered.scalar;
-  f->state_count = (c->used - begin) / sizeof(double);
+  return (c->used - begin) / sizeof(double);
 }
 
 static size_t lay_out(const model_shape* shape, tendonfmu_finger* f, unsigned char* base, uint32_t** words) {
@@ -226,10 +230,12 @@ static size_t lay_out(const model_shape* shape, tendonfmu_finger* f, unsigned ch
   f->tendon_lanes = (f->tendons + 3) / 4 * 4;
   f->slots = f->joints * f->tendon_lanes + f->joint_lanes;
   *words = take(&c, sizeof(uint32_t) * (shape->word_count + (size_t)MODEL_EXTENSION_WORDS * shape->extension_count));
-  lay_out_state(f, &c);
+  f->state_count = place_run(f, &c, state_rows, state_row_count, &f->state);
+  f->next_count = place_run(f, &c, next_rows, sizeof next_rows / sizeof next_rows[0], &f->next);
   lay_out_prepared(f, &c);
   place_rows(f, &c, other_rows, sizeof other_rows / sizeof other_rows[0]);
   f->extensions.row = take(&c, f->shape.extension_count * sizeof(extension_row));
+  f->scratch.shares = take(&c, is_present(shape, WITH_BANDS) ? sizeof(band_shares) : 0);
   f->scratch.view = take(&c, f->slots / 4 * sizeof(slot_view));
   return c.used;
 }

@@ -74,7 +74,7 @@ typedef struct friction_memory {
   int relaxes;       /* some place has a relaxation time */
   double step;       /* that kept, stiff, soft are of, s */
   double* remembers; /* [n × M + N] 1 or 0 */
-  double* sections;  /* [n × M + N] S, of the cord from a level to the tendon's end; with cord_stretch only */
+  double* sections;  /* [n × M + N] S, of the cord from a level to the tendon's end */
   friction_element element[MODEL_MAX_ELEMENTS];
 } friction_memory;
 
@@ -101,7 +101,7 @@ typedef struct derived_numbers {
   double *contact_threshold, *contact_per_force; /* [N] */
   double* initial_torque;                        /* [N] */
   double *deviation, *deviation_per_force;       /* [N] */
-  double* band_square; /* [n × BANDS × BAND_NUMBERS] squares of the numbers of contact.bands */
+  double* band_square; /* [n × BAND_NUMBERS × BANDS] squares of the numbers of contact.bands */
   double* load_arm;    /* [n × M] r_ij·k_i; this and the one before with contact.bands only */
   link_geometry links; /* arrays NULL without links */
   int* least_link;     /* [n] of find_least_links() */
@@ -125,21 +125,21 @@ enum {
 
 typedef enum sensor_fault_kind { SENSOR_IS_WELL, FORCE_FAILS, POSITION_FAILS } sensor_fault_kind;
 
-/* What sensor_fault remembers of a tendon: doubles alone, since it is a part of the saved state. */
+/* What sensor_fault remembers of the tendons, [M] each, one run. */
 typedef struct sensor_memory {
-  double fault;                              /* sensor_fault_kind */
-  double fault_since;                        /* s; 0 without a fault */
-  double unsound_at;                         /* s, last sample of a fault that the springs contradict; 0 without */
-  double known;                              /* 1 where w follows from the others, with the rows still in use */
-  double force, position, joint_side;        /* f0, x0 and w of the last sample: N, m, m */
-  double held_force, force_held_since;       /* N, from which f0 has not gone by more than its resolution; s */
-  double has_taut;                           /* 1 where the next two are known */
-  double taut_force, taut_spring;            /* N, f0 and y = k·(x0 − w) of a sample with a taut tendon */
-  double held_position, position_held_since; /* m, the same of x0; s */
-  double force_then, joint_side_then;        /* N, m: f0 and w when x0 was there first */
+  double* fault;                               /* sensor_fault_kind */
+  double* fault_since;                         /* s; 0 without a fault */
+  double* unsound_at;                          /* s, last sample of a fault that the springs contradict; 0 without */
+  double* known;                               /* 1 where w follows from the others, with the rows still in use */
+  double *force, *position, *joint_side;       /* f0, x0 and w of the last sample: N, m, m */
+  double *held_force, *force_held_since;       /* N, from which f0 has not gone by more than its resolution; s */
+  double* has_taut;                            /* 1 where the next two are known */
+  double *taut_force, *taut_spring;            /* N, f0 and y = k·(x0 − w) of a sample with a taut tendon */
+  double *held_position, *position_held_since; /* m, the same of x0; s */
+  double *force_then, *joint_side_then;        /* N, m: f0 and w when x0 was there first */
 } sensor_memory;
 
-enum { SENSOR_NUMBERS = sizeof(sensor_memory) / sizeof(double) };
+enum { SENSOR_NUMBERS = sizeof(sensor_memory) / sizeof(double*) };
 
 /* What a joint whose torque a failing sensor falsifies remembers. */
 typedef enum joint_watch { JOINT_WATCHED, JOINT_BLIND, JOINT_BEGINS_ANEW } joint_watch;
@@ -162,7 +162,7 @@ typedef struct finger_state {
   double *stuck_since, *last_stuck; /* s */
   double* jumped;                   /* [N] Σ Δb, N·m; this and the next with contact.bands only */
   double* bands;                    /* [N] band_memory */
-  double* sensor;                   /* [M] sensor_memory; this and the next with sensor_fault only */
+  sensor_memory sensor;             /* this and the next with sensor_fault only */
   double* watch;                    /* [N] joint_watch of the last sample */
   /* with a memory of friction only; edges in the first row of slots, pulleys in the second */
   double* element;               /* [elements × 2 × (n × M + N)] F of each element, N, N·m */
@@ -197,17 +197,32 @@ typedef enum row_condition {
   WITH_CORDS /* that stretch */
 } row_condition;
 
+/* What a number in a saved state may be at most or, with MINUS, at least. */
+typedef enum state_bound {
+  ZERO,
+  ONE,
+  TWO,
+  THREE,
+  A_TIME, /* LARGEST_TIME, … */
+  TWO_TIMES,
+  A_SUM,
+  TWO_SUMS,
+  A_SQUARE,
+  ANY_NUMBER, /* that is finite */
+  MINUS = 0x80
+} state_bound;
+
 /* Rows of numbers, each with a pointer in struct tendonfmu_finger: all of its memory follows from such. */
 typedef struct finger_row {
-  uint16_t place, pointers; /* offset of the first pointer; how many side by side */
-  uint16_t count;           /* of the unit; 0: 1 */
-  unsigned char unit;       /* row_unit */
-  unsigned char when;       /* row_condition */
+  uint16_t place;         /* offset of the first pointer */
+  unsigned char pointers; /* how many side by side */
+  unsigned char count;    /* of the unit; 0: 1 */
+  unsigned char unit;     /* row_unit */
+  unsigned char when;     /* row_condition */
   /* what may stand in a saved state */
-  unsigned char whole;    /* whole numbers only */
-  unsigned char spare;    /* lanes that stand for nothing are tracked along; else they hold 0 */
-  unsigned char together; /* the numbers of one lane stand together, not the lanes of one number */
-  double low, high;
+  unsigned char whole;            /* whole numbers only */
+  unsigned char spare;            /* lanes that stand for nothing are tracked along; else they hold 0 */
+  unsigned char low, high;        /* state_bound */
   const struct finger_row* parts; /* [count] where each has limits of its own */
 } finger_row;
 
@@ -247,13 +262,14 @@ typedef struct finger_scratch {
   double *slip_torque, *limit;       /* [N] friction of eq. (10), all that it can be: B, N·m */
   double* motor_load;                /* [N] x, N·m */
   double* unknown;                   /* [N] max(V, W) before this sample, N·m */
-  band_shares shares;                /* of the last step */
+  double* young;                     /* [N] of a mean that began with this joint's, instead of those in shares */
+  band_shares* shares;               /* of the last step */
   /* with sensor_fault only */
-  double* sensor;           /* [M] as in the state, after this sample */
+  sensor_memory sensor;     /* as in the state, after this sample */
   double* inverse_routing;  /* [n × M] R⁺ of the rows in use */
   double* leverage;         /* [M] h/(1 − h) of the rows in use; 0 of the others */
   double* determined;       /* [M] 1: the others determine the angles */
-  double* row_in_use;       /* [M] 1 or 0 */
+  double* row_in_use;       /* [M] 1 or 0; 0 where the angles are measured */
   double* watch;            /* [N] as in the state, after this sample */
   double* angle_shift;      /* [N] rad, by which the angles of the sample before change with the rows in use */
   int angles_determined;    /* no row in use belongs to a failing sensor */
@@ -287,7 +303,8 @@ struct tendonfmu_finger {
   double *start, *candidate, *parameters; /* [p] of the image, being checked, in force */
   size_t prepared_bytes;                  /* from `parameters` on: these and all arrays that follow from them */
   double* state;                          /* [state_count], what `remembered` points into */
-  size_t state_count;
+  double* next; /* [next_count], the end of the state after this sample, from what sensor_fault remembers on */
+  size_t state_count, next_count;
   extension_rows extensions;
   friction_memory memory;
   derived_numbers derived;
@@ -316,11 +333,6 @@ static inline int is_first(const tendonfmu_finger* finger) {
 static inline double angle_before_step(const tendonfmu_finger* finger, size_t joint) {
   const double angle = finger->remembered.angle[joint];
   return finger->derived.settings.watches_sensors ? angle + finger->scratch.angle_shift[joint] : angle;
-}
-
-/* What sensor_fault remembers of each tendon, in `sensor` of the state or of scratch. */
-static inline sensor_memory* sensors_in(double* sensor) {
-  return (sensor_memory*)(void*)sensor;
 }
 
 /* Rows of lanes: four at once, for which no library is called. */
@@ -378,8 +390,21 @@ size_t finger_memory_size(const model_shape* shape);
  */
 tendonfmu_finger* finger_lay_out(const model_shape* shape, void* memory, uint32_t** words);
 
-/* --- the laws in force at a slot (slot_view.c): the side by the sign of its velocity, the working points by the joint
- * angle --- */
+/* --- what follows from the parameters (derived_numbers.c), the one place where it is computed -----------------------
+ */
+
+/* Recomputes finger->derived from finger->parameters: at creation, and after parameters were written or restored.
+ * R⁺ is only computed again where `routing_changed`. */
+void derive_numbers(tendonfmu_finger* finger, int routing_changed);
+
+/* Copies parameters and all that follows from them, of a finger of the same image. */
+void take_prepared_numbers(tendonfmu_finger* finger, const tendonfmu_finger* prepared);
+
+/* Makes the next sample look at all laws anew. */
+void forget_views(tendonfmu_finger* finger);
+
+/* --- the laws in force at a slot (derived_numbers.c): the side by the sign of its velocity, the working points by the
+ * joint angle --- */
 
 /* Fills the view of `count` slots from `slot` on: its lanes from slot % 4 on.
  *   angle         of the joint before (q_0 = 0); of no meaning to the slots of joints

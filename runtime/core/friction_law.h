@@ -6,6 +6,8 @@
  * Fc, Fs − Fc, 1/vs, Fv (paper VII: 1/vs behaves, vs does not). */
 #pragma once
 
+#include "elementary.h"
+
 enum { LAW_COULOMB, LAW_DROP, LAW_RATE, LAW_VISCOUS, LAW_SIDE_NUMBERS };
 
 enum { LAW_NUMBERS = 2 * LAW_SIDE_NUMBERS }; /* positive side, negative side */
@@ -18,14 +20,21 @@ typedef struct law_slopes {
 } law_slopes;
 
 /* side [LAW_SIDE_NUMBERS]; speed >= 0. The value has the bits of the kernels. */
-law_slopes law_with_slopes(const double* side, double speed);
-
-/* exp(−x) for x >= 0 as the kernels have it, and 1 − exp(−x) without cancellation. */
-double law_exponential(double x);
-double law_one_minus_exponential(double x);
-
-/* ln x of a normal x > 0, within an ulp, without the host's libm. */
-double law_logarithm(double x);
+static inline law_slopes law_with_slopes(const double* side, double speed) {
+  const double decay = law_exponential(speed * side[LAW_RATE]);
+  const double stribeck = side[LAW_DROP] * decay;
+  law_slopes of;
+  of.value = side[LAW_COULOMB] + stribeck + side[LAW_VISCOUS] * speed;
+  of.by_speed = side[LAW_VISCOUS] - side[LAW_RATE] * stribeck;
+  of.decay = decay;
+  return of;
+}
 
 /* Fills one side of a law from the numbers of a description. */
-void law_pack_side(double* side, double fs, double fc, double vs, double fv);
+static inline void law_pack_side(double* side, double fs, double fc, double vs, double fv) {
+  side[LAW_COULOMB] = fc;
+  side[LAW_DROP] = fs - fc;
+  /* bounded, so that 0·(1/vs) is 0 for the smallest vs that a double can hold */
+  side[LAW_RATE] = 1.0 / vs < 1e300 ? 1.0 / vs : 1e300;
+  side[LAW_VISCOUS] = fv;
+}

@@ -66,14 +66,15 @@ static void set_element(tendonfmu_finger* f, size_t e, size_t slot, effect_place
   f->memory.relaxes |= numbers[RELAXATION_TIME] > 0.0;
 }
 
-/* the rows that hold at a slot, at most two */
+/* the rows that hold at a slot, at most two; none where the tendon moves no joint from there on */
 static void find_elements(tendonfmu_finger* f, size_t slot) {
+  const int turns = slot >= f->joints * f->tendon_lanes || f->memory.sections[slot] > 0.0;
   size_t found = 0;
   int rank = 0;
   double sum = 0.0;
   for (size_t r = 0; r < f->extensions.memory; ++r) {
     const extension_row* row = memory_row(f, r);
-    const int here = row->effect == &effect_presliding ? rank_at(f, row->place, slot) : 0;
+    const int here = turns && row->effect == &effect_presliding ? rank_at(f, row->place, slot) : 0;
     if (here > rank) {
       rank = here;
       found = 0;
@@ -149,9 +150,7 @@ void find_memory(tendonfmu_finger* f) {
     return;
   }
   f->memory.compliance = cord_compliance(f);
-  if (f->shape.stretches) {
-    find_sections(f);
-  }
+  find_sections(f);
   for (size_t slot = 0; slot < f->slots; ++slot) {
     find_elements(f, slot);
   }
@@ -171,18 +170,6 @@ void turn_places(tendonfmu_finger* f, double step) {
   f->memory.stretch = first ? 0.0 : f->memory.compliance;
   if (f->memory.relaxes && f->memory.step != (first ? 0.0 : step)) {
     find_decay(f, first ? 0.0 : step);
-  }
-}
-
-void remember_elements(tendonfmu_finger* f) {
-  const finger_state* to = &f->remembered;
-  const finger_scratch* from = &f->scratch;
-  const size_t bytes = 2 * f->slots * sizeof(double);
-  memcpy(to->element, from->element, f->memory.elements * bytes);
-  memcpy(to->by_turning, from->by_turning, bytes);
-  memcpy(to->by_limit, from->by_limit, bytes);
-  if (f->memory.compliance > 0.0) {
-    memcpy(to->tension, from->tension, bytes);
   }
 }
 

@@ -83,9 +83,9 @@ typedef struct key_row {
   double minimum, maximum;
   unsigned char above_minimum; /* the minimum itself is not allowed */
   unsigned char tunable, has_default;
+  unsigned char count; /* key_count */
+  uint16_t option; /* the bit of the model image without which it is not there; 0: always there */
   double default_value;
-  key_count count;
-  uint32_t option; /* the bit of the model image without which it is not there; 0: always there */
 } key_row;
 
 /* The row of number `offset` of an item; not of ITEM_EXTENSION. */

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "contact_place.h"
+#include "kernel_choice.h"
 #include "sensor_fault.h"
 
 enum { MOST_ROWS = 4 };
@@ -101,28 +102,27 @@ static void give_deviations(double* to, const double* variance, size_t count, si
 
 /* 0 without contact.bands */
 static void give_terms(double* to, const tendonfmu_finger* f, size_t row) {
-  const size_t width = BANDS * BAND_TERMS, n = f->joints;
-  for (size_t j = 0; to && j < n; ++j) {
-    for (size_t k = 0; k < BANDS; ++k) {
-      double* terms = to + (row * n + j) * width + k * BAND_TERMS;
-      if (f->derived.settings.has_bands) {
-        band_terms(bands_of(f, j), k, terms);
-      } else {
-        memset(terms, 0, BAND_TERMS * sizeof *terms);
-      }
+  for (size_t j = 0; to && j < f->joints; ++j) {
+    _Alignas(32) double terms[BAND_TERMS * BANDS] = {0.0};
+    if (f->derived.settings.has_bands) {
+      size_t band;
+      f->kernel->weigh_bands(bands_of(f, j), f->derived.band_square + j * BANDS * BAND_NUMBERS, terms, &band);
+    }
+    for (size_t k = 0; k < BANDS * BAND_TERMS; ++k) {
+      to[(row * f->joints + j) * BANDS * BAND_TERMS + k] = terms[k % BAND_TERMS * BANDS + k / BAND_TERMS];
     }
   }
 }
 
 /* failing sensors and what they hide; 0 without sensor_fault */
 static void give_sensors(const tendonfmu_finger* finger, const tendonfmu_outputs* outputs, size_t row) {
-  const sensor_memory* sensor = sensors_in(finger->remembered.sensor);
+  const double* fault = finger->remembered.sensor.fault;
   const size_t m = finger->tendons;
   for (size_t i = 0; outputs->sensor_fault && i < m; ++i) {
-    outputs->sensor_fault[row * m + i] = sensor && sensor[i].fault != SENSOR_IS_WELL;
+    outputs->sensor_fault[row * m + i] = fault && fault[i] != SENSOR_IS_WELL;
   }
   if (outputs->contact_observable) {
-    outputs->contact_observable[row] = sensor && !any_joint_is_blind(finger);
+    outputs->contact_observable[row] = fault && !any_joint_is_blind(finger);
   }
 }
 

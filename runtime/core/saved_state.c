@@ -2,14 +2,14 @@
 
 #include "step.h"
 
+#include <float.h>
 #include <string.h>
 
 #include "bytes.h"
-#include "derived_numbers.h"
 #include "parameters.h"
 #include "sensor_fault.h"
 
-enum { HEADER_BYTES = 40, HASHED_FROM = 32, STATE_VERSION = 3 };
+enum { HEADER_BYTES = 40, HASHED_FROM = 32, STATE_VERSION = 4 };
 
 static const char magic[8] = "TFMUSTA";
 
@@ -41,11 +41,17 @@ static int is_in_use(const tendonfmu_finger* f, row_unit unit, size_t i) {
   }
 }
 
+static double bound_of(unsigned char bound) {
+  static const double size[] = {
+      0.0, 1.0, 2.0, 3.0, LARGEST_TIME, 2.0 * LARGEST_TIME, LARGEST_SUM, 2.0 * LARGEST_SUM, LARGEST_SQUARE, DBL_MAX};
+  return bound & MINUS ? -size[bound & ~MINUS] : size[bound];
+}
+
 /* whether number `part` of a row in lane i is within limits; those of lanes that stand for nothing are 0 */
 static int is_within(const tendonfmu_finger* f, const finger_row* row, size_t part, size_t i, double value) {
   const finger_row* limits = row->parts ? row->parts + part : row;
   const int tied = !limits->spare && !is_in_use(f, row->unit, i);
-  const double low = tied ? 0.0 : limits->low, high = tied ? 0.0 : limits->high;
+  const double low = tied ? 0.0 : bound_of(limits->low), high = tied ? 0.0 : bound_of(limits->high);
   return value >= low && value <= high && (!limits->whole || value == (double)(int)value); /* NaN is neither */
 }
 
@@ -54,8 +60,7 @@ static int rows_are_sound(const tendonfmu_finger* f, const unsigned char* state)
   for (const finger_row* row = state_rows; row < state_rows + state_row_count; ++row) {
     const size_t parts = row_count(f, row) * row->pointers, lanes = unit_length(f, row->unit);
     for (size_t k = 0; k < parts * lanes; ++k, from += 8) {
-      const size_t part = row->together ? k % parts : k / lanes, lane = row->together ? k / parts : k % lanes;
-      if (!is_within(f, row, part, lane, load_f64(from))) {
+      if (!is_within(f, row, k / lanes, k % lanes, load_f64(from))) {
         return 0;
       }
     }
@@ -102,7 +107,7 @@ static int rests_are_sound(const tendonfmu_finger* f, const unsigned char* state
 static int check_bytes(tendonfmu_finger* f, const unsigned char* from, message_line message) {
   const size_t size = saved_state_size(f), p = f->shape.parameter_count;
   if (memcmp(from, magic, sizeof magic) != 0 || load_u32(from + 8) != STATE_VERSION) {
-    return message_write(message, "not a saved state of this version: it does not begin with \"TFMUSTA\" and 3");
+    return message_write(message, "not a saved state of this version: it does not begin with \"TFMUSTA\" and 4");
   }
   if (load_u32(from + 12) != 0 || load_u64(from + 16) != size || load_u64(from + 32) != f->image_id) {
     return message_write(message, "saved state of another finger: size or model image differ");

@@ -123,7 +123,10 @@ static int all_finite(const tendonfmu_finger* f) {
     }
     probe += 0.0 * (1e160 * sum) + (0.0 * s->angle[j] + 0.0 * velocity[j]); /* infinite above 1.8e148 */
   }
-  return probe == 0.0 && (!f->derived.settings.watches_sensors || sensors_are_finite(f));
+  for (size_t i = 0; f->derived.settings.watches_sensors && i < f->tendons; ++i) {
+    probe += 0.0 * (1e30 * s->sensor.joint_side[i]); /* nor the force of a spring there */
+  }
+  return probe == 0.0;
 }
 
 /* --- memory ---------------------------------------------------------------------------------------------------------
@@ -144,15 +147,10 @@ static void remember_sample(tendonfmu_finger* f, double time, double velocity_ga
   copy_lanes(to->torque, from->torque, f->joint_lanes);
   copy_lanes(to->force, from->force, f->tendon_lanes);
   copy_lanes(to->slack, from->slack, f->tendon_lanes);
-  if (f->derived.settings.watches_sensors) {
-    remember_sensors(f);
+  if (f->next_count) {
+    memcpy(f->state + (f->state_count - f->next_count), f->next, f->next_count * sizeof(double));
   }
-  if (f->shape.extension_count) {
-    remember_extensions(f);
-  }
-  if (f->memory.elements) {
-    remember_elements(f);
-  }
+  to->scalar[STATE_UNWELL] = from->unwell;
   to->scalar[STATE_STEP] = is_first(f) ? 0.0 : time - to->scalar[STATE_TIME];
   to->scalar[STATE_TIME] = time;
   to->scalar[STATE_VELOCITY_GAIN] = velocity_gain;

@@ -40,7 +40,7 @@ void directional_derivative(const tendonfmu_finger* finger, const tendonfmu_inpu
 /* A finger's state as bytes.
  *
  *   offset  0  8 bytes  "TFMUSTA" and a zero
- *           8  u32      version = 1
+ *           8  u32      version = 4
  *          12  u32      0
  *          16  u64      size of the whole block
  *          24  u64      checksum of all that follows

@@ -13,7 +13,6 @@
 extern "C" {
 #include "bytes.h"
 #include "contact_place.h"
-#include "derived_numbers.h"
 #include "effect.h"
 #include "extensions.h"
 #include "finger_memory.h"

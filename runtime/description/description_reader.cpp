@@ -168,7 +168,7 @@ void check_keys(const json_node& extension, const effect_type& effect) {
 }
 
 /* 1 to count, 0 where it is absent and may be */
-std::uint32_t read_number(const json_node& node, std::uint32_t count, place_need need, const std::string& meaning) {
+std::uint32_t read_number(const json_node& node, std::uint32_t count, unsigned need, const std::string& meaning) {
   if (node.absent() && need != PLACE_REQUIRED) {
     return 0;
   }

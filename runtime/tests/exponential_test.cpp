@@ -15,8 +15,8 @@
 #include "test_finger.h"
 
 extern "C" {
+#include "elementary.h"
 #include "exponential_kernels.h"
-#include "sine_cosine.h"
 }
 
 namespace {

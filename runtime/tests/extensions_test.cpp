@@ -125,6 +125,19 @@ TEST(Presliding, EverywhereIsThatOfEveryPlaceByItsThreshold) {
   EXPECT_FALSE(finer == all);
 }
 
+TEST(Presliding, HasNoMemoryFromWhereItsTendonMovesNoJoint) {
+  const Finger finger(test_finger::image(R"({
+    "format": "tendonfmu-finger-1", "name": "f", "joints": [{}, {}],
+    "tendons": [{"stiffness": 4000, "moment_arms": [0.01, 0]}, {"stiffness": 4000, "moment_arms": [0, 0.01]}],
+    "contact": {"threshold": [1, 1]}, "extensions": [{"effect": "presliding", "displacement": 0.05}]})"));
+  const double* remembers = finger.handle->memory.remembers;
+  const std::size_t lanes = finger.handle->tendon_lanes;
+  EXPECT_EQ(std::vector<double>(remembers, remembers + 3), (std::vector<double>{1.0, 1.0, 0.0}));
+  EXPECT_EQ(std::vector<double>(remembers + lanes, remembers + lanes + 3), (std::vector<double>{0.0, 1.0, 0.0}));
+  EXPECT_EQ(std::vector<double>(remembers + 2 * lanes, remembers + 2 * lanes + 3),
+            (std::vector<double>{1.0, 1.0, 0.0}));
+}
+
 TEST(Places, OfARowAreTheSlotsThatItActsOn) {
   Finger finger(test_finger::image());
   constexpr auto nowhere = EFFECT_NOWHERE;

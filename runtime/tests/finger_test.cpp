@@ -403,8 +403,8 @@ TEST(Memory, LacksWhatTheFingerHasNot) {
   const finger_state& s = finger.handle->remembered;
   const finger_scratch& o = finger.handle->scratch;
   const derived_numbers& d = finger.handle->derived;
-  for (const double* row : {s.bands, s.sensor, s.watch, s.element, s.tension, s.extension, o.limit, o.sensor,
-                            o.own_limit, o.tension, d.band_square, d.links.axis}) {
+  for (const double* row : {s.bands, s.sensor.fault, s.watch, s.element, s.tension, s.extension, o.limit,
+                            o.sensor.fault, o.own_limit, o.tension, d.band_square, d.links.axis}) {
     EXPECT_EQ(row, nullptr);
   }
 }
@@ -438,12 +438,11 @@ TEST(SavedState, OfWatchedSensorsWithANumberThatCannotBeIsRefused) {
   Finger finger(image_of(test_finger::watching));
   finger.run(failing());
   const finger_state& s = finger.handle->remembered;
-  sensor_memory* sensor = sensors_in(s.sensor);
-  expect_refused(finger, {{"third fault", &sensor[0].fault, 3.0},
-                          {"fault without a tendon", &sensor[3].fault, 1.0},
-                          {"half known", &sensor[0].known, 0.5},
-                          {"fault since no time", &sensor[0].fault_since, 1e16},
-                          {"not a number", &sensor[1].taut_force, nan},
+  expect_refused(finger, {{"third fault", s.sensor.fault, 3.0},
+                          {"fault without a tendon", s.sensor.fault + 3, 1.0},
+                          {"half known", s.sensor.known, 0.5},
+                          {"fault since no time", s.sensor.fault_since, 1e16},
+                          {"not a number", s.sensor.taut_force + 1, nan},
                           {"third watch", s.watch, 3.0},
                           {"twice unwell", finger.handle->state + STATE_UNWELL, 2.0}});
 }
@@ -483,9 +482,9 @@ TEST(SensorFault, ARowLeavesAndComesBackExactly) {
   const std::vector<double> whole(finger.handle->derived.inverse_routing,
                                   finger.handle->derived.inverse_routing + joints * finger.handle->tendon_lanes);
   const double* inverse = finger.handle->scratch.inverse_routing;
-  sensor_memory sensor[4] = {};
-  sensor[1].fault = FORCE_FAILS;
-  use_rows(finger.handle, sensor);
+  double fault[4] = {};
+  fault[1] = FORCE_FAILS;
+  use_rows(finger.handle, fault);
   EXPECT_EQ(finger.handle->scratch.angles_determined, 1);
   for (std::size_t j = 0; j < joints; ++j) {
     for (std::size_t k = 0; k < joints; ++k) { /* R⁺ R = 1 without that row */
@@ -498,8 +497,8 @@ TEST(SensorFault, ARowLeavesAndComesBackExactly) {
     }
     EXPECT_EQ(inverse[j * finger.handle->tendon_lanes + 1], 0.0);
   }
-  sensor[0].fault = POSITION_FAILS; /* both of a pair */
-  use_rows(finger.handle, sensor);
+  fault[0] = POSITION_FAILS; /* both of a pair */
+  use_rows(finger.handle, fault);
   EXPECT_EQ(finger.handle->scratch.angles_determined, 0);
   recall_rows(finger.handle);
   EXPECT_TRUE(std::equal(whole.begin(), whole.end(), inverse));

@@ -1,5 +1,5 @@
 /* The detector of method "bands": what changes within four times, over bounds learned from free motion
- * (docs/reference/semantics/detection.md). Scalar code, compiled once. */
+ * (docs/reference/semantics/detection.md). contact_detector.c decides, kernel/band_watch.h computes. */
 #pragma once
 
 #include <stddef.h>
@@ -38,30 +38,16 @@ typedef struct band_sample {
 
 /* What depends on the step alone. */
 typedef struct band_shares {
-  double step;                          /* s */
   double mean[BANDS], reference[BANDS]; /* of a new value */
   double kept[BANDS];                   /* of D and S */
   double held;                          /* of a reference in contact, a base, and home without contact */
   double unknown;
+  double step; /* s */
 } band_shares;
 
-/* Fills the shares unless they are those of this step. one_minus_exponentials: of a kernel (kernel_choice.h). */
-void band_find_shares(band_shares* shares, double step,
-                      void (*one_minus_exponentials)(const double* x, double* values, size_t count));
-
-/* A joint begins anew; unknown: V. First: at the first sample, where it was not watched, and when it first moves. */
-void band_begin(band_memory* joint, const band_sample* sample, double time, double unknown, int first);
-
-/* Takes a sample; of the one before: whether the joint was in contact, and whether any was. Returns the level. */
-double band_take(band_memory* joint, const band_sample* sample, const band_shares* shares,
-                 const double squares[BANDS * BAND_NUMBERS], double time, int before, int any, size_t* band);
-
-/* Whether a joint is in contact now, from whether it was, its level and the band that has it. */
-int band_decide(band_memory* joint, const band_sample* sample, const band_shares* shares, double time, double rounding,
-                int before, double level, size_t band);
+extern const double band_mean_time[BANDS], band_reference_time[BANDS]; /* A, M, s */
 
 /* max(V, W): friction whose state nobody knows, N·m. */
-double band_unknown(const band_memory* joint);
-
-/* The terms of a band [BAND_TERMS]. */
-void band_terms(const band_memory* joint, size_t band, double* terms);
+static inline double band_unknown(const band_memory* joint) {
+  return joint->unknown > joint->turned ? joint->unknown : joint->turned;
+}

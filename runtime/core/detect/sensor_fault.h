@@ -10,14 +10,14 @@
 #define LEAST_FREEDOM 0.1
 
 /* Fills R⁺ of the rows in use in scratch, and what the other rows predict of each.
- *   sensor [M]    whose faults count; tendons of failing sensors leave in ascending order */
-void use_rows(tendonfmu_finger* finger, const sensor_memory* sensor);
+ *   fault [M]    sensor_fault_kind; tendons of failing sensors leave in ascending order */
+void use_rows(tendonfmu_finger* finger, const double* fault);
 
 /* The same from what the finger remembers; nothing without sensor_fault. */
 void recall_rows(tendonfmu_finger* finger);
 
 /* Weights [m] of the tendons in the mean force: 1/(number of sound ones), 0 of a failing force; all where all fail. */
-void weigh_forces(const tendonfmu_finger* finger, const sensor_memory* sensor, double* weight);
+void weigh_forces(const tendonfmu_finger* finger, const double* fault, double* weight);
 
 /* Whether a joint was blind at the last sample; 0 without sensor_fault. */
 int any_joint_is_blind(const tendonfmu_finger* finger);
@@ -30,12 +30,6 @@ void watch_sensors(tendonfmu_finger* finger, double time, double step);
 
 /* Mean |f0| over the tendons whose force does not fail, over all where every one does. */
 double mean_sound_force(const tendonfmu_finger* finger);
-
-/* 0 where w is so large that its spring's force would not be finite. */
-int sensors_are_finite(const tendonfmu_finger* finger);
-
-/* The sample is accepted. */
-void remember_sensors(tendonfmu_finger* finger);
 
 /* Before T_eff: joints that are watched again begin as at the first sample, b_eff = τ − T. */
 void begin_bias_anew(tendonfmu_finger* finger);

@@ -32,11 +32,10 @@ typedef struct effect_parameter {
   const char* unit_at_joint;   /* where it differs there; NULL: the same */
   const char* unit_everywhere; /* of a row without a place, where it differs there; NULL: the same */
   double minimum, maximum;
-  int above_minimum;
-  double missing_value;    /* taken where the description leaves the key out */
-  int required;            /* 1: it must not be left out */
-  double scale;            /* expected magnitude where nothing is known, for the estimation */
-  double scale_everywhere; /* of a row without a place; 0: the same */
+  unsigned char above_minimum, required; /* 1: the minimum itself is not allowed; it must not be left out */
+  double missing_value;                  /* taken where the description leaves the key out */
+  double scale;                          /* expected magnitude where nothing is known, for the estimation */
+  double scale_everywhere;               /* of a row without a place; 0: the same */
 } effect_parameter;
 
 /* Where a row of the description's extensions acts; 0-based, EFFECT_NOWHERE where the key is absent. */
@@ -109,13 +108,13 @@ typedef struct effect_type {
   const char* name; /* as in a description */
   uint32_t id;      /* in the model image; never reused */
   effect_kind kind;
-  int order; /* of signals: rows act in the order of these, whatever theirs */
-  place_need joint, tendon;
-  place_rule rule;
-  int level;  /* 1: it may stand at a level */
-  int most;   /* rows of the same place; 0: any number */
-  int one_of; /* of its first numbers exactly one is above 0; 0: no such rule */
-  uint32_t parameter_count;
+  int order;                   /* of signals: rows act in the order of these, whatever theirs */
+  unsigned char joint, tendon; /* place_need */
+  unsigned char rule;          /* place_rule */
+  unsigned char level;         /* 1: it may stand at a level */
+  unsigned char most;          /* rows of the same place; 0: any number */
+  unsigned char one_of;        /* of its first numbers exactly one is above 0; 0: no such rule */
+  unsigned char parameter_count;
   const effect_parameter* parameters;
 
   /* Numbers that it remembers, part of the finger's state block: so many, or what state_count() says of a finger of n

@@ -2,7 +2,7 @@
 
 #include "effect_facts.h"
 
-#include "sine_cosine.h"
+#include "elementary.h"
 
 /* T_j = w_j·(sine·sin θ + cosine·cos θ) for all j up to the joint l that turns the link, θ = Σ_{k<=l} w_k q_k: its
  * weight, exact where the axes are parallel (w = ±1); w_k is the cosine of the angle between the axes of k and l. */

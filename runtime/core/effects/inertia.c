@@ -2,7 +2,7 @@
 
 #include "effect_facts.h"
 
-#include "sine_cosine.h"
+#include "elementary.h"
 
 /* --- inertia: T_j = inertia·a, a the backward difference of the joint's velocity; 0 at the first sample. */
 

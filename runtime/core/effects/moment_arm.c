@@ -2,7 +2,7 @@
 
 #include "effect_facts.h"
 
-#include "sine_cosine.h"
+#include "elementary.h"
 
 /* The true moment arm is r_ij + c, c a constant or a function of the joint's angle: T_j = −c·f0. Joint angles still
  * come from the described arms. */

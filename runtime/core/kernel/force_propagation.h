@@ -2,11 +2,13 @@
  * behind them, and the torques they make, eqs. (6)-(10); sums over the tendons, eqs. (2) to (5). */
 #pragma once
 
+#include "band_watch.h"
 #include "exponential.h"
 #include "finger_memory.h"
 #include "friction_elements.h"
 #include "friction_law.h"
 #include "kernel_choice.h"
+#include "sensor_watch.h"
 
 /* Fc + (Fs − Fc)·exp(−|v|/vs) + Fv·|v| of some laws of a view, from a lane on; exponent(v) is the smooth part of
  * eq. (1) */
@@ -71,21 +73,26 @@ HOT_INLINE const slot_view* view_at(tendonfmu_finger* f, const motion* m, double
   return view;
 }
 
+/* what the friction rows make of a friction value */
+HOT_INLINE quad gripped(const tendonfmu_finger* f, size_t slot, quad friction) {
+  if (!f->extensions.friction) {
+    return friction;
+  }
+  return quad_load(f->scratch.grip + slot) * friction;
+}
+
 /* F of some slots from |F| of the law: with the sign of v where |v| > v_min, 0 where the effect sticks (fig. 2b), or
  * |F| itself where it has a memory; and what the friction rows make of it */
 HOT_INLINE quad acting_friction(const tendonfmu_finger* f, const motion* m, quad magnitude) {
   const quad by_motion = quad_keep(m->moving, quad_with_sign(magnitude, m->velocity));
-  if (!f->extensions.gripped) {
-    return by_motion;
-  }
-  return quad_load(f->scratch.grip + m->slot) * quad_select(slides_at(f, m->slot), magnitude, by_motion);
+  const quad acting = f->memory.elements ? quad_select(slides_at(f, m->slot), magnitude, by_motion) : by_motion;
+  return gripped(f, m->slot, acting);
 }
 
 /* |F| of one effect at some slots for the bands, whether it acts or not */
 HOT_INLINE void keep_limit(const tendonfmu_finger* f, double* limit, size_t slot, quad magnitude) {
   if (f->derived.settings.has_bands) {
-    const quad grip = f->extensions.gripped ? quad_load(f->scratch.grip + slot) : quad_set(1.0);
-    quad_store(limit + slot, grip * magnitude);
+    quad_store(limit + slot, gripped(f, slot, magnitude));
   }
 }
 
@@ -176,7 +183,12 @@ HOT_INLINE quad loss_at(tendonfmu_finger* f, size_t slot, size_t row, const doub
   if (!f->memory.elements) {
     return loss;
   }
-  return quad_select(slides_at(f, slot), loss_of_memory(f, slot, row, value, acting, before), loss);
+  const quad_mask slides = slides_at(f, slot);
+  if (!quad_bits(slides)) {
+    remember_nothing(f, row * f->slots + slot);
+    return loss;
+  }
+  return quad_select(slides, loss_of_memory(f, slot, row, value, acting, before), loss);
 }
 
 /* f_A and f_B along some tendons from i on, as a recursion, and what they make at each joint: the sums over the tendons
@@ -356,5 +368,8 @@ static void one_minus_exponentials(const double* x, double* values, size_t count
   }
 }
 
-#define STEP_KERNEL(name) \
-  { name, one_minus_exponentials, multiply, tendon_velocities, find_friction, remember_slots, restart_rests }
+#define STEP_KERNEL(name)                                                                                \
+  {                                                                                                      \
+    name, one_minus_exponentials, multiply, tendon_velocities, watch_tendons, follow_bands, weigh_bands, \
+        find_friction, remember_slots, restart_rests                                                     \
+  }

@@ -84,12 +84,13 @@ HOT_INLINE quad step_alone(tendonfmu_finger* f, const places* p) {
   const quad held = quad_load(element->kept + p->slot) * quad_load(f->remembered.element + p->at);
   const quad stiff = quad_load(element->stiff + p->slot), soft = quad_load(element->soft + p->slot);
   const quad fixed = held + stiff * p->turned, by_limit = soft * p->turned;
-  const quad limit = quad_load(element->share + p->slot) * p->limit;
+  const quad share = quad_load(element->share + p->slot), limit = share * p->limit;
   const quad trial = fixed + by_limit * limit, force = clip_to(trial, limit);
   const quad_mask free = quad_greater(limit, quad_abs(trial));
   quad_store(s->element + p->at, force);
   quad_store(s->by_turning + p->at, quad_keep(free, stiff + soft * limit));
-  quad_store(s->by_limit + p->at, quad_select(free, by_limit, quad_with_sign(quad_set(1.0), trial)));
+  const quad slips = quad_with_sign(quad_set(1.0), trial);
+  quad_store(s->by_limit + p->at, share * quad_select(free, by_limit, slips));
   return force;
 }
 
@@ -154,6 +155,15 @@ HOT_INLINE quad loss_of_memory(tendonfmu_finger* f, size_t slot, size_t row, qua
   const quad tension = quad_load(f->remembered.tension + p.at);
   p.turned = quad_load(f->scratch.travelled + slot) + (before - tension) * p.compliance;
   return step_places(f, &p);
+}
+
+/* At places that have no memory. */
+HOT_INLINE void remember_nothing(const tendonfmu_finger* f, size_t at) {
+  for (size_t e = 0; e < f->memory.elements; ++e) {
+    quad_store(f->scratch.element + e * 2 * f->slots + at, quad_set(0.0));
+  }
+  quad_store(f->scratch.by_turning + at, quad_set(0.0));
+  quad_store(f->scratch.by_limit + at, quad_set(0.0));
 }
 
 /* The same of the joints' own friction. */

@@ -4,8 +4,10 @@
 
 #include <string.h>
 
-#include "exponential.h"
+#include "force_propagation.h"
 #include "processor.h"
+
+const step_kernel step_plain = STEP_KERNEL("plain");
 
 const step_kernel* kernel_choose(const char* name) {
   const int automatic = strcmp(name, "auto") == 0;

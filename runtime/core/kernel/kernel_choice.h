@@ -3,6 +3,14 @@
 
 #include "finger_memory.h"
 
+/* What sensor_fault finds of all tendons, a bit each. */
+typedef struct sensor_findings {
+  uint64_t jumps;             /* of f0 */
+  uint64_t forces, positions; /* stand, and contradict the spring */
+  uint64_t stands;            /* f0, whether it does or not */
+  uint64_t recovers;
+} sensor_findings;
+
 /* What of a sample is computed on lanes side by side. */
 struct step_kernel {
   const char* name;
@@ -12,6 +20,16 @@ struct step_kernel {
   void (*multiply)(const tendonfmu_finger* finger, const double* matrix, const double* x, double* product);
   /* eq. (5), from the joint velocities in the last row of velocity [n × M + N] */
   void (*tendon_velocities)(const tendonfmu_finger* finger, double* velocity);
+  /* What sensor_fault remembers of all tendons, into scratch, where the faults up to now stand; angle [n] rad: as all
+   * tendons or the sensors have it */
+  sensor_findings (*watch_tendons)(const tendonfmu_finger* finger, const double* angle, double time, double step);
+  /* The bands of a joint take a sample; any: some joint was in contact at the one before. */
+  void (*follow_bands)(band_memory* joint, const band_sample* sample, const band_shares* shares, double young,
+                       double age, int any);
+  /* The largest share of its bound that what counts of a band's change has, both squared, and of which band.
+   *   squares    [BAND_NUMBERS × BANDS] of the numbers of contact.bands
+   *   terms      [BAND_TERMS × BANDS] receives what each is multiplied by */
+  double (*weigh_bands)(const band_memory* joint, const double* squares, double* terms, size_t* band);
   /* F of every slot, forces, and T of eq. (10), in scratch; returns whether any slot comes to rest or begins to move */
   int (*find_friction)(tendonfmu_finger* finger);
   /* Fig. 5 for every slot, after its transitions: the side of what moves, the time of what rests */
