@@ -174,7 +174,7 @@ def structure_of(found: Diagnosis) -> dict[str, Any]:
                 "title": capital(cause.title),
                 "place": capital(names.places(cause)),
                 "size": cause.size,
-                "gain": percent_interval(cause.gain),
+                "gain": percent_interval(cause.gain) + " in tendon positions" * (cause.gain_unit == "m"),
                 "explanation": cause.explanation,
             }
             for cause in found.causes
