@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from tendonfmu.diagnosis.candidate_columns import CandidateColumns, Proposal, candidate_columns
 from tendonfmu.diagnosis.effects import MECHANISMS, Place, Variant, by_name
 from tendonfmu.diagnosis.effects.mechanism import add_to_number
-from tendonfmu.diagnosis.extension_fit import number_columns
+from tendonfmu.diagnosis.extension_fit import carried, number_columns
 from tendonfmu.diagnosis.samples import Samples, Span, span_of
 from tendonfmu.model import native, own_copy
 from tendonfmu.model.balance import balanced_forces
@@ -276,6 +276,18 @@ def test_a_fit_estimates_what_is_added(case: Case, name: str) -> None:
             wanted.add(path)
         assert all(any(each.startswith(path) for each in added | before) for path in wanted), (proposal.place, wanted)
         assert added, (name, proposal.place, variant.shape)
+
+
+def test_a_drop_that_is_new_stays_where_the_others_numbers_come_from_a_fit(case: Case) -> None:
+    """A fit that starts without a drop never finds one."""
+    known = own_copy(case.data)
+    side = known["tendons"][2]["edge_friction"][0]
+    side.update(static=0.06, coulomb=0.06)  # of a fit of the law without a drop
+    shape = {"stribeck_velocity": 0.004}
+    extended = by_name("stribeck").extended(case.data, Place(1, 3), shape, [0.01])
+    found = carried(extended, known)["tendons"][2]["edge_friction"][0]
+    assert (found["coulomb"], found["static"]) == pytest.approx((0.06, 0.06 * 0.03 / 0.02))
+    assert found["stribeck_velocity"] == 0.004
 
 
 def test_sizes_stay_within_what_a_description_takes(case: Case) -> None:

@@ -99,7 +99,10 @@ def test_an_effect_of_surfaces_is_asked_for_everywhere_at_joints_at_tendons_and_
         (Place(2, 2), (0.4,)),
     ]
     assert by_key[HERE, name, 2, 1].mix[:, 0] == pytest.approx([0.0, 0.0, 1.0, 0.0])
-    assert all(each.low == [0.0] and each.high[0] > 1.0 for each in found)
+    assert all(each.low == [0.0] for each in found)
+    # bounds are in the same unit: the first place limits no other
+    assert {each.high[0] for each in found if each.level != HERE} == {LARGEST}
+    assert by_key[HERE, name, 1, 2].high == pytest.approx([0.2 * LARGEST])
 
 
 def test_signs_bound_what_is_learned(columns: Numbers) -> None:

@@ -179,7 +179,8 @@ def _single(proposal: Proposal, count: int, arms: Numbers, reach: Numbers) -> Ca
     variant, place, name = proposal.variant, proposal.place, proposal.mechanism.name
     mix = np.zeros((count, variant.count))
     mix[proposal.columns] = np.eye(variant.count)
-    low, high = _signed(variant)
+    expected = np.array(variant.expected)
+    low, high = _signed(variant, expected)
     if name in SCALING and place.tendon is not None:
         largest = LARGEST_SCALING * (1.0 if name == "force_gain" else float(np.abs(arms[place.tendon - 1]).max()))
         if name == "moment_arm_variation" and place.joint is not None:
@@ -190,14 +191,12 @@ def _single(proposal: Proposal, count: int, arms: Numbers, reach: Numbers) -> Ca
     level = EVERYWHERE if place == Place() else HERE
     least = LEAST_OF_FAST if variant.shape.get("turns", 1.0) != 1.0 else 0.0
     terms = (Term(proposal.mechanism, place, variant.shape, (1.0,) * variant.count),)
-    expected = np.array(variant.expected)
     return Candidate(Where(name, *place), terms, mix, low, high, level, expected, _step(variant), least)
 
 
-def _signed(variant: Variant) -> tuple[Numbers, Numbers]:
-    """Return the bounds of the magnitudes [d]."""
-    signs = np.array(variant.signs)
-    most = LARGEST * np.array(variant.expected)
+def _signed(variant: Variant, ordinary: Numbers) -> tuple[Numbers, Numbers]:
+    """Return the bounds of the magnitudes [d], whose ordinary sizes are given [d]."""
+    signs, most = np.array(variant.signs), LARGEST * ordinary
     low, high = np.where(signs > 0, 0.0, -most), np.where(signs < 0, 0.0, most)
     return low, np.minimum(high, LARGEST_SECANT) if variant.full is not None else high
 
@@ -228,7 +227,8 @@ def _together(where: Where, level: int, parts: Sequence[Proposal], count: int) -
     for part in parts:
         mix[np.arange(part.columns.start, part.columns.stop), np.arange(first.count)] = part.variant.expected
     terms = tuple(Term(part.mechanism, part.place, part.variant.shape, part.variant.expected) for part in parts)
-    return Candidate(where, terms, mix, *_signed(first), level, np.array(first.expected), _step(first))
+    ordinary = np.ones(first.count)
+    return Candidate(where, terms, mix, *_signed(first, ordinary), level, ordinary, _step(first))
 
 
 # --- numbers that the description has ---------------------------------------------------------------------------------

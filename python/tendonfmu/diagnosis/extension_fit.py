@@ -283,9 +283,10 @@ def carried(data: Data, known: Data) -> Mapping[str, Any]:
         for own in number.paths:
             if path is not None:
                 set_number(result, own, float(get_number(known, path)))
-    for effect in effects(result):  # a drop that only this one has stays above what came of the other
-        for side in sides_at(result, effect.path):
-            side["static"] = max(side["static"], side["coulomb"])
+    for effect in effects(data):  # a drop that only this one has stays as large a share
+        for own, side in zip(sides_at(data, effect.path), sides_at(result, effect.path), strict=True):
+            if own["static"] > own["coulomb"] and side["static"] <= side["coulomb"]:
+                side["static"] = side["coulomb"] * own["static"] / (own["coulomb"] or own["static"])
     return result
 
 
