@@ -284,9 +284,9 @@ def carried(data: Data, known: Data) -> Mapping[str, Any]:
             if path is not None:
                 set_number(result, own, float(get_number(known, path)))
     for effect in effects(data):  # a drop that only this one has stays as large a share
-        for own, side in zip(sides_at(data, effect.path), sides_at(result, effect.path), strict=True):
-            if own["static"] > own["coulomb"] and side["static"] <= side["coulomb"]:
-                side["static"] = side["coulomb"] * own["static"] / (own["coulomb"] or own["static"])
+        for new, side in zip(sides_at(data, effect.path), sides_at(result, effect.path), strict=True):
+            if new["static"] > new["coulomb"] and side["static"] <= side["coulomb"]:
+                side["static"] = side["coulomb"] * new["static"] / (new["coulomb"] or new["static"])
     return result
 
 

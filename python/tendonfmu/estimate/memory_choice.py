@@ -3,14 +3,14 @@
 Each form is fitted from several starts to the same windows of the recordings and judged by its error on contiguous
 parts that are held out: all numbers are refitted without a part by one Gauss-Newton step from the whole fit. A form
 with more numbers must be better by `MATERIAL` and by `CERTAIN` standard errors over the parts, else the simpler one
-stays.
+stays. Parts are added to the relative and to the absolute form, and the better end is taken by the same rule.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import partial, reduce
 from typing import Any
 
 import numpy as np
@@ -40,6 +40,7 @@ from tendonfmu.recordings import FitRecording, best_angles, make_grid
 Rows = tuple[dict[str, Any], ...]
 
 FOLDS = 8
+NEAR = 1.5  # times the least squared error of a whole form: with its parts another one may be better
 MATERIAL, CERTAIN = 0.05, 1.64  # of the rms, and standard errors over the folds
 DISTANCE = 2e-4  # m, to start from: what a cord on a pulley moves before it slips
 STEPS, TOLERANCE = 12, 0.3
@@ -83,17 +84,9 @@ def choose_memory(
     plain = search.fit("none", ())
     force = float(np.mean([recording.mean_force for recording in recordings]))
     forms = [search.fit(name, rows) for name, rows in _whole_forms(finger.data, force)]
-    best = min(forms, key=lambda form: form.errors.sum())
-    cords = ({"effect": CORDS, "stiffness": stiffness} for stiffness in STRETCH)
-    best = search.simpler(best, search.fit(f"{best.name}, cords", *[(*best.rows, row) for row in cords], near=best))
-    rigid = _without_times(best.rows)
-    best = search.simpler(
-        search.fit(f"{best.name}, no relaxation", *[_scaled(rigid, factor) for factor in LONGER], near=best), best
-    )
-    best = search.simpler(best, search.fit(f"{best.name}, levels", _by_level(finger.data, best.rows), near=best))
-    best = search.simpler(best, search.fit(f"{best.name}, two elements", _doubled(best.rows), near=best))
-    for name, rows in _pruned(best):
-        best = search.simpler(search.fit(name, rows, near=best), best)
+    least = min(form.errors.sum() for form in forms)
+    grown = [search.grown(form) for form in forms if form.errors.sum() < NEAR * least]
+    best = reduce(search.simpler, sorted(grown, key=lambda form: (form.numbers, form.errors.sum())))
     best = search.simpler(plain, best)
     return MemoryChoice(search.refined(best), best, tuple(search.tried))
 
@@ -131,6 +124,20 @@ class _Search:
         problem.mean, problem.known = guess_prior(problem)
         found = minimise(problem, problem.state(problem.scale.coordinates(begin)), 30, TOLERANCE, rough=True)
         return with_values(structure, estimator.values(problem.unknowns_at(found.state)))
+
+    def grown(self, form: Form) -> Form:
+        """Return a form with the parts that make it clearly better, and without those that do not."""
+        data = self._finger.data
+        cords = ({"effect": CORDS, "stiffness": stiffness} for stiffness in STRETCH)
+        best = self.simpler(form, self.fit(f"{form.name}, cords", *[(*form.rows, row) for row in cords], near=form))
+        rigid = _without_times(best.rows)
+        starts = [_scaled(rigid, factor) for factor in LONGER]
+        best = self.simpler(self.fit(f"{best.name}, no relaxation", *starts, near=best), best)
+        best = self.simpler(best, self.fit(f"{best.name}, two elements", _doubled(best.rows), near=best))
+        best = self.simpler(best, self.fit(f"{best.name}, levels", _by_level(data, best.rows), near=best))
+        for name, rows in _pruned(best):
+            best = self.simpler(self.fit(name, rows, near=best), best)
+        return best
 
     def simpler(self, first: Form, second: Form) -> Form:
         """Return the second form if it is clearly better than the first, else the first."""
