@@ -215,6 +215,21 @@ def test_what_scales_the_measured_torque_stays() -> None:
     assert list(asked.parameters_) == [path]
 
 
+@pytest.mark.parametrize("remembers", [False, True])
+def test_a_described_delay_stays_where_friction_remembers(remembers: bool) -> None:
+    """That imitates a delay; what positions showed of it, as `diagnose` writes it, would be lost."""
+    finger = small_finger()
+    memory = [{"effect": "presliding", "displacement": 0.2}] if remembers else []
+    finger["extensions"] = [{"effect": "time_delay", "delay": 0.004}, *memory]
+    path = "extensions[1].delay"
+    free = shared(finger, passes=1, tolerance=0.5).fit(made_recording())
+    assert (path in free.parameters_) != remembers
+    assert (get_number(free.description_.data, path) == 0.004) == remembers
+    if remembers:
+        asked = shared(finger, share=[], only=[path], passes=1, tolerance=0.5).fit(made_recording())
+        assert list(asked.parameters_) == [path]
+
+
 @pytest.mark.parametrize(
     ("share", "unknowns"),
     [(["tendons"], 19 + 6), (["tendons[*].pulley_friction[*]"], 10 + 4 + 4 * 11), ([], 70)],

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from tendonfmu.detect import sample_seconds
-from tendonfmu.diagnosis import Event, Samples, events_of, held_delay, without_events
+from tendonfmu.diagnosis import Event, Samples, events_of, without_events
 from tendonfmu.estimate import (
     FIT_REPORT,
     Choice,
@@ -22,6 +22,7 @@ from tendonfmu.estimate import (
     FrictionFit,
     Watch,
     build_structure,
+    held_delay,
     learn_batch,
     read_previous_fit,
     settings_of,

@@ -16,7 +16,6 @@ from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from .contact_scan import events_of, without_events
-    from .delay import held_delay
     from .diagnosis import diagnose
     from .effects.mechanism import Where
     from .effects.places import thresholds

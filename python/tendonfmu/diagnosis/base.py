@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tendonfmu.arrays import Data, Flags, Numbers
-from tendonfmu.diagnosis.delay import DELAY, Positions, delay_of_torque, held_delay, late_forces
+from tendonfmu.diagnosis.delay import DELAY, Positions, delay_of_torque, late_forces
 from tendonfmu.diagnosis.effects import MECHANISMS, Mechanism, Term, Where, by_name
 from tendonfmu.diagnosis.extension_fit import (
     FitSettings,
@@ -29,7 +29,7 @@ from tendonfmu.diagnosis.extension_fit import (
 from tendonfmu.diagnosis.samples import Samples
 from tendonfmu.diagnosis.selection import Judged, LeastSizes, least_sizes
 from tendonfmu.diagnosis.view import View, look
-from tendonfmu.estimate import choose_memory
+from tendonfmu.estimate import choose_memory, held_delay
 from tendonfmu.model import Finger
 from tendonfmu.recordings import FitRecording
 

@@ -6,13 +6,13 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from tendonfmu.arrays import Data, Flags, Numbers
+from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.diagnosis.effects import Place, Term, by_name
 from tendonfmu.diagnosis.extension_fit import FittedModel
 from tendonfmu.diagnosis.samples import Samples, shifted
 from tendonfmu.diagnosis.selection import LeastSizes
 from tendonfmu.diagnosis.view import look
-from tendonfmu.model import EFFECT_NUMBERS, Finger, extension_rows, moment_arms
+from tendonfmu.model import EFFECT_NUMBERS, Finger, moment_arms
 from tendonfmu.recordings import FitRecording, with_linear_springs
 from tendonfmu.statistics import Interval, blocks_of, gain_interval, variance_between
 
@@ -22,11 +22,6 @@ FINE = 0.001  # s
 LARGE = 0.005  # s: smaller delays compete with other causes, by their derivative
 CLEAR_GAIN = 0.1  # of the rms that a starting delay must remove: any other missing effect looks a little like a delay
 CLEAR = 0.25  # error of the best delay, at most, over the median error of all delays
-
-
-def held_delay(data: Data) -> tuple[str, ...]:
-    """Return the pattern of a described delay, for fits that leave it: friction that remembers imitates one."""
-    return ("extensions[*].delay",) if any(row["effect"] == DELAY.name for row in extension_rows(data)) else ()
 
 
 def late_forces(delay: float, *, fixed: bool = False) -> tuple[Term, ...]:

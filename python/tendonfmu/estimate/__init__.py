@@ -58,6 +58,7 @@ if TYPE_CHECKING:
         Choice,
         Structure,
         build_structure,
+        held_delay,
         torque_scales,
         with_values,
     )

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from tendonfmu.arrays import Numbers
+from tendonfmu.arrays import Data, Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.files import (
     FIT_REPORT,
@@ -43,9 +43,10 @@ from tendonfmu.estimate.fit_report import (
 )
 from tendonfmu.estimate.identifiability import EffectCoverage, coverage_of
 from tendonfmu.estimate.learning import FrictionFitOptions, Interrupted, Learned, Watch, settings_of, unknown_names
+from tendonfmu.estimate.memory import has_memory
 from tendonfmu.estimate.memory_choice import Remembered, learn_remembered
 from tendonfmu.estimate.methods import learn_batch, learn_ekf
-from tendonfmu.estimate.structure import Choice, build_structure, torque_scales, with_values
+from tendonfmu.estimate.structure import Choice, build_structure, held_delay, torque_scales, with_values
 from tendonfmu.estimate.verdicts import Fitted, judge_numbers, sizes_of
 from tendonfmu.files import finite
 from tendonfmu.model import Finger, FingerSource, number_of, read_finger
@@ -147,7 +148,7 @@ class FrictionFit:
             finger = with_previous_values(finger, previous)
         else:
             previous = estimated_numbers(finger)
-        fixed = options.fix if options.only else (*options.fix, *torque_scales(finger.data))
+        fixed = options.fix if options.only else (*options.fix, *_left_alone(finger.data))
         self._choice = Choice(_sides(options), options.only, fixed, options.share, options.scale)
         self.structure_ = build_structure(finger, self._choice)
         self.start_ = self.structure_.start
@@ -331,6 +332,11 @@ class FrictionFit:
                 *(_series(evaluation, "comparison") for evaluation in self.comparisons_),
             ],
         )
+
+
+def _left_alone(data: Data) -> tuple[str, ...]:
+    """Return what is estimated only if it is asked for: it imitates friction, or motion alone does not tell it."""
+    return (*torque_scales(data), *(held_delay(data) if has_memory(data) else ()))
 
 
 def _with_routing(given: Finger, sources: Sequence[RecordingSource]) -> tuple[Finger, RoutingEntry]:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.arrays import Numbers
+from tendonfmu.arrays import Data, Numbers
 from tendonfmu.errors import InputError, own_fault
 from tendonfmu.estimate.memory import has_memory
 from tendonfmu.model import (
@@ -25,6 +25,7 @@ from tendonfmu.model import (
     Number,
     effects,
     estimable_numbers,
+    extension_rows,
     friction_numbers,
     law_path,
     laws,
@@ -82,6 +83,11 @@ class Choice:
 def torque_scales(data: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the paths of the numbers that scale the measured torque, which motion alone does not tell."""
     return tuple(number.path for number in friction_numbers(data) if number.extension in SCALING)
+
+
+def held_delay(data: Data) -> tuple[str, ...]:
+    """Return the pattern of a described delay, for fits that leave it: friction that remembers imitates one."""
+    return ("extensions[*].delay",) if any(row["effect"] == "time_delay" for row in extension_rows(data)) else ()
 
 
 def build_structure(finger: Finger, choice: Choice) -> Structure:
