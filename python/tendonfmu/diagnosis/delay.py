@@ -61,33 +61,35 @@ class Positions:
         self._measured = all("joint_position" in own for own in groups)
         self._apart = np.eye(len(self._arms)) - (0.0 if self._measured else self._arms @ np.linalg.pinv(self._arms))
         tells = all("tendon_position" in own for own in groups) and np.linalg.matrix_rank(self._apart) > 0
-        self.delay = self._found(recordings) if tells else None  # s; None: they do not show whether there is one
+        # s, with its standard error; None: they do not show whether there is one
+        self.delay, self.error = self._found(recordings) if tells else (None, np.nan)
 
     def gain(self, judged: Iterable[tuple[FitRecording, Flags]], delay: float, seed: int) -> Interval:
         """Return which share of the rms that their equation leaves of some samples a delay removes."""
-        pairs = []
-        for recording, chosen in judged:
-            late = np.array([0.0, delay])
-            squares = [np.zeros(len(recording.time)) for _ in late]
-            for part, left in self._left(recording, late):
-                for whole, own in zip(squares, left, strict=True):
-                    whole[part] = (own**2).sum(axis=1)
-            index = blocks_of(recording.time, chosen)
-            pairs.append(np.column_stack([index.sums(each) for each in squares]))
+        pairs = [self._squares(*each, np.array([0.0, delay])) for each in judged]
         before, after = np.concatenate(pairs).T
         return gain_interval(before, after, seed, variance_between(pairs) / len(pairs))
 
-    def _found(self, recordings: Sequence[FitRecording]) -> float | None:
+    def _found(self, recordings: Sequence[FitRecording]) -> tuple[float | None, float]:
         delays = np.arange(-LONGEST, LONGEST + FINE / 2, FINE)
-        errors = np.zeros(len(delays))
-        for recording in recordings:
-            for _, left in self._left(recording, delays):
-                errors += [float(np.sum(each**2)) for each in left]
-        best = int(np.argmin(errors))
-        if not 0 < best < len(delays) - 1 or errors[best] > CLEAR * float(np.median(errors)):
-            return None
-        before, at, after = errors[best - 1 : best + 2]
-        return float(delays[best] + FINE * 0.5 * (before - after) / max(before - 2 * at + after, 1e-300))
+        errors = np.concatenate([self._squares(one, np.ones(len(one.time), dtype=bool), delays) for one in recordings])
+        whole = errors.sum(axis=0)
+        best = int(np.argmin(whole))
+        if not 0 < best < len(delays) - 1 or whole[best] > CLEAR * float(np.median(whole)):
+            return None, np.nan
+        before, at, after = np.stack([whole, *(whole - errors)])[:, best - 1 : best + 2].T
+        found, *others = delays[best] + FINE * 0.5 * (before - after) / np.maximum(before - 2 * at + after, 1e-300)
+        # jackknife (Efron and Stein, Ann. Statist. 9, 1981)
+        return float(found), float(np.std(others) * np.sqrt(len(others) - 1))
+
+    def _squares(self, recording: FitRecording, chosen: Flags, delays: Numbers) -> Numbers:
+        """Return by block of the chosen samples the sum of squares that the equation leaves (m²) [K, delays]."""
+        index = blocks_of(recording.time, chosen)
+        squares = np.zeros((len(delays), len(recording.time)))
+        for part, left in self._left(recording, delays):
+            for whole, own in zip(squares, left, strict=True):
+                whole[part] = (own**2).sum(axis=1)
+        return np.column_stack([index.sums(each) for each in squares])
 
     def _left(self, recording: FitRecording, delays: Numbers) -> Iterator[tuple[slice, Iterator[Numbers]]]:
         """Yield each part, and what the equation leaves of it with each delay, less its mean (m)."""

@@ -28,7 +28,7 @@ from tendonfmu.diagnosis.gain import Gain, Unseen, measure_gain
 from tendonfmu.diagnosis.names import size_of
 from tendonfmu.diagnosis.next_experiment import Experiments, Question, plan_experiments
 from tendonfmu.diagnosis.remainder import measure_remainder, remainder_map, unexplained_of
-from tendonfmu.diagnosis.result import Cause, CausePlace, Diagnosis, Invisible, Unexplained, by_gain
+from tendonfmu.diagnosis.result import Cause, CausePlace, Diagnosis, Invisible, Unexplained, by_gain, with_error
 from tendonfmu.diagnosis.samples import Samples, Span, as_described, span_of
 from tendonfmu.diagnosis.search import ExtensionSearch, calibrated, search, terms_of
 from tendonfmu.diagnosis.selection import SIGNIFICANCE, Judged, confirmed, invisible_effects, names_needed, step_p_value
@@ -194,7 +194,11 @@ class _Bench:
         order = self._order.get(frozenset(map(id, terms_of(causes))), [])
         found = zip(order, cause_parameters(self.nominal.data, order, model), strict=True)
         places = {id(term): CausePlace(*term.place, numbers) for term, numbers in found}
-        return places, intervals_of(model, self._predicted, self._settings) if order else {}
+        intervals = intervals_of(model, self._predicted, self._settings) if order else {}
+        late = [term for term in order if term.mechanism is DELAY and self._found.base.positions.delay is not None]
+        for path, (value, _) in (each for term in late for each in places[id(term)].parameters.items()):
+            intervals[path] = with_error(value, self._found.base.positions.error)
+        return places, intervals
 
     def written(self, model: FittedModel) -> Data:
         """Return a description with what is known of its numbers."""
