@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from .columns import GROUPS, Nis, RecordingEntry, RoutingEntry, Whiteness, element_of, right_spelling
+    from .columns import GROUPS, Nis, RecordingEntry, RoutingEntry, Whiteness
     from .converters import convert_file
     from .converters.column_map import read_log_format
     from .converters.inspection import Inspection, inspect_log
@@ -65,7 +65,7 @@ if TYPE_CHECKING:
         routed,
         smooth_speeds,
     )
-    from .signal_noise import FEWEST, BestAngles, best_angles, joint_position_noise, stopped, with_angles, zero_phase
+    from .signal_noise import FEWEST, best_angles, joint_position_noise, stopped, zero_phase
     from .tendon_springs import with_linear_springs
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -16,15 +16,14 @@ if TYPE_CHECKING:
     from .detection import score_sheets, tail_sheet, write_score_figures, write_tune_figures
     from .diagnosis_figures import diagnosis_sheets
     from .diagnosis_files import REPORT, build_report, check_folder, write_diagnosis
-    from .diagnosis_text import confusion_sentence, error_sentence, left_sentence, names_of, unit_of
-    from .diagnosis_types import CauseEntry, DiagnosisReport
+    from .diagnosis_text import left_sentence, names_of, unit_of
+    from .diagnosis_types import DiagnosisReport
     from .fit_figures import law_sheets, torque_sheets
-    from .fit_page import ResidualTable, residual_tables, write_fit_page
+    from .fit_page import residual_tables, write_fit_page
     from .history import headline, history_report, rows_of_lines, trend_sentence, write_history
     from .marked_finger import friction_figure
     from .numbers import Row, Table, capital, column, html_of, percent, percent_interval, rms, rounded, together
     from .page import Tile, make_folder, render, write_figures
-    from .rerun_recording import check_rerun, write_rerun
     from .run_page import check_page, run_report, run_sheets, write_run_page
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from .jobs import (
         Job,
         Row,
-        failed_row,
         fault_words,
         refuse_if_all_failed,
         row_file,

@@ -93,13 +93,11 @@ def run_hand(
     output: Path,
     options: RunOptions,
     report: Path | None = None,
-    rerun: Path | None = None,
     progress: bool | None = None,
 ) -> None:
     """Run all fingers over a recording and write one table."""
-    for name, given in (("--rerun", rerun), ("--report", report)):
-        if given is not None:
-            raise InputError(f"{model}: a hand, given with {name}; expected a finger, which it shows alone")
+    if report is not None:
+        raise InputError(f"{model}: a hand, given with --report; expected a finger, which it shows alone")
     hand, name = read_hand(model), console.name_of(output)
     console.check_table(output, recording, *hand.files)
     result = run_fingers(hand, recording, kinematics=options.kinematics)
