@@ -31,10 +31,10 @@ if TYPE_CHECKING:
         StandIn,
         check_output,
         check_output_folder,
-        is_about,
         path_of,
         whole_file,
         write_bytes,
+        write_files,
         write_text,
     )
 

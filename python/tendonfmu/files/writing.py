@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path, PosixPath, WindowsPath
 from typing import TYPE_CHECKING
 
@@ -108,20 +108,31 @@ def whole_file(file: Path) -> Iterator[Path]:
         temporary.chmod(0o666 & ~mask)
         os.replace(temporary, file)
     except OSError as error:
-        if not is_about(error, file.parent):
+        if not _is_about(error, file.parent):
             raise
         raise OutputError(f"{file}: cannot be written ({error.strerror or error})") from None
     finally:
         temporary.unlink(missing_ok=True)
 
 
-def is_about(error: OSError, folder: Path) -> bool:
+def _is_about(error: OSError, folder: Path) -> bool:
     """Return whether an error in writing concerns a folder."""
     if error.errno is None:  # not an error of the operating system
         return False
     if not isinstance(error.filename, str | bytes):
         return True
     return folder.absolute() in Path(os.fsdecode(error.filename)).absolute().parents
+
+
+def write_files(folder: Path, contents: Mapping[str, bytes]) -> None:
+    """Write files to a folder, made if missing: all of them or, where the disk is full, none; the first comes last."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be written ({error.strerror or error})") from None
+    with ExitStack() as written:
+        for name, content in contents.items():
+            written.enter_context(whole_file(folder / name)).write_bytes(content)
 
 
 def write_text(path: Path, text: str) -> None:

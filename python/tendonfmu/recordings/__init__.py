@@ -54,7 +54,7 @@ if TYPE_CHECKING:
         read_recording,
         read_recordings,
     )
-    from .residuals import Model, consistency, delayed_torque, rms, run_parts, whiteness
+    from .residuals import Model, consistency, delayed_torque, rms, run_parts, whiteness, with_linear_springs
     from .routing import (
         Learned,
         TendonRouting,
@@ -66,6 +66,5 @@ if TYPE_CHECKING:
         smooth_speeds,
     )
     from .signal_noise import FEWEST, best_angles, joint_position_noise, stopped, zero_phase
-    from .tendon_springs import with_linear_springs
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

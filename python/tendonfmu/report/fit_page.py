@@ -21,15 +21,13 @@ from tendonfmu.estimate import (
     known_numbers,
     verdicts,
 )
-from tendonfmu.files import are, counted, write_text
+from tendonfmu.files import are, counted, write_files
 from tendonfmu.model import Finger, effects, part_of
 from tendonfmu.recordings import RecordingEntry
-from tendonfmu.report.fit_figures import fit_sheets, strongest_pairs
-from tendonfmu.report.numbers import Row, Table, column, percent, rounded, together, torque_unit, unit_text
-from tendonfmu.report.page import Tile, make_folder, render
+from tendonfmu.report.fit_figures import fit_sheets
+from tendonfmu.report.kit import Row, Table, Tile, column, percent, render, rounded, together, torque_unit, unit_text
 
 PAGE = "report.html"
-PAIRS = 20  # most strongly correlated pairs in the table
 EXAMPLES = 3  # paths listed for each reason
 _METHODS = {
     "batch": "Maximum likelihood over all samples at once (batch)",
@@ -341,8 +339,7 @@ def lines(fit: FrictionFit) -> Iterator[str]:
 
 def write_fit_page(picture: FitPicture, folder: Path) -> dict[Path, str]:
     """Write `report.html` to a folder, which is made if missing, whole or not at all."""
-    make_folder(folder)
-    write_text(folder / PAGE, fit_page(picture))
+    write_files(folder, {PAGE: fit_page(picture).encode()})
     return {folder / PAGE: "all results, to be read in a browser"}
 
 
@@ -365,10 +362,6 @@ def fit_page(picture: FitPicture) -> str:
         residual_headings=RESIDUAL_HEADINGS,
         consistency=list(consistency(picture)),
         doubts=list(_doubts(report)),
-        pairs=[
-            (f"{pair.correlation:+.3f}".replace("-", "−"), pair.first, pair.second)
-            for pair in strongest_pairs(picture, PAIRS)
-        ],
         recordings=[_recording(recording) for recording in report["recordings"]],
         options={name: _option(value) for name, value in report["options"].items()},
         groups=list(_groups(picture)),
