@@ -20,7 +20,8 @@ import mujoco
 
 from command import Call
 from mjcf_models import ARMS, BOWSTRING, fixed_model
-from tendonfmu.mjcf.finger_import import ImportedFinger, ImportSettings, import_finger
+from tendonfmu.mjcf.finger_import import ImportedFinger, import_finger
+from tendonfmu.options import ImportOptions
 
 BOTH = ("mcp", "pip")
 
@@ -31,7 +32,7 @@ def written(folder: Path, text: str, name: str = "model.xml") -> Path:
 
 
 def imported(folder: Path, text: str, **settings: Any) -> ImportedFinger:
-    return import_finger(written(folder, text), ImportSettings(**({"joints": BOTH} | settings)))
+    return import_finger(written(folder, text), ImportOptions(**({"joints": BOTH} | settings)))
 
 
 def rows(finger: ImportedFinger, effect: str) -> list[dict[str, Any]]:
@@ -110,7 +111,7 @@ def test_an_arm_that_varies_is_warned_of_with_its_figures_and_its_slope(tmp_path
     assert "tendon bow, joint hinge" in warning and "--kinematics 2" in advice
     told = re.search(r"moment arm ([\d.]+) to ([\d.]+) mm", warning)
     assert told and [float(told[1]), float(told[2])] == pytest.approx([1e3 * arm.min(), 1e3 * arm.max()], rel=0.02)
-    assert imported(tmp_path, BOWSTRING, joints=["hinge"], tolerance=0.9).warnings == []
+    assert imported(tmp_path, BOWSTRING, joints=["hinge"], arm_tolerance=0.9).warnings == []
 
 
 def test_the_pull_of_an_actuator_is_the_tendon_force_of_the_description(tmp_path: Path) -> None:

@@ -1,9 +1,13 @@
 """The commands that make and use descriptions: `describe`, and `import` and `export` for MuJoCo models."""
 
+# ruff: noqa: RUF009 (`option` makes a field)
+
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -13,10 +17,7 @@ from tendonfmu.commands.command import command, output_option
 from tendonfmu.commands.console import print_json, say, warn
 from tendonfmu.errors import InputError
 from tendonfmu.model import description_text
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
+from tendonfmu.options import File, ImportOptions, Options, option
 
 # --- a description to begin with, of a machine with one joint or of a finger ------------------------------------------
 
@@ -25,43 +26,32 @@ JOINT, FINGER = "joint", "finger"  # what is described
 LARGEST = 1e6  # of torques, speeds and inertias of a described machine
 
 
-@command("describe")
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class DescribeOptions(Options):
+    """Options of `describe`."""
+
+    joints: str | None = option(None, "finger: its joints, base first", "NAME,NAME")
+    tendon: Sequence[str] = option((), "finger: a tendon and the joints that its pull turns", '"NAME JOINT+ JOINT-"')
+    table: File | None = option(None, "finger: a line for each tendon, in place of --tendon", "TABLE.txt")
+    recording: File | None = option(None, "recording from which its numbers are taken, .csv or .parquet", "REC")
+    torque: float | None = option(None, "N.m; largest torque of the drive [default: 1]", None, 1e-9, LARGEST)
+    speed: float | None = option(None, "rad/s; largest speed of the joint [default: 5]", None, 1e-9, LARGEST)
+    coulomb: float | None = option(None, "N.m; Coulomb friction [default: 5 % of the torque]", None, 0.0, LARGEST)
+    viscous: float | None = option(
+        None, "N.m.s/rad; viscous friction [default: 2 % of torque/speed]", None, 0.0, LARGEST
+    )
+    inertia: float | None = option(None, "kg.m2; moved inertia [default: 1 % of torque/speed]", None, 1e-12, LARGEST)
+    moment_arm: float = option(1.0, "m; 1 if the recording has torque as tendon force", None, 1e-4, 10.0)
+
+
+@command("describe", DescribeOptions)
 def describe_files(
     what: Annotated[
         str, typer.Argument(metavar="joint|finger", help="a servo, an axis of an arm, a linear drive; or a finger")
     ],
     output: Annotated[Path, output_option("FINGER.json", "description to write")],
     name: Annotated[str, typer.Option(help="name of the machine, or of the finger")],
-    joints: Annotated[str | None, typer.Option(metavar="NAME,NAME", help="finger: its joints, base first")] = None,
-    tendon: Annotated[
-        list[str] | None,
-        typer.Option(metavar='"NAME JOINT+ JOINT-"', help="finger: a tendon and the joints that its pull turns"),
-    ] = None,
-    table: Annotated[
-        Path | None, typer.Option(metavar="TABLE.txt", help="finger: a line for each tendon, in place of --tendon")
-    ] = None,
-    recording: Annotated[
-        Path | None, typer.Option(metavar="REC", help="recording from which its numbers are taken, .csv or .parquet")
-    ] = None,
-    torque: Annotated[
-        float | None, typer.Option(min=1e-9, max=LARGEST, help="N.m; largest torque of the drive [default: 1]")
-    ] = None,
-    speed: Annotated[
-        float | None, typer.Option(min=1e-9, max=LARGEST, help="rad/s; largest speed of the joint [default: 5]")
-    ] = None,
-    coulomb: Annotated[
-        float | None, typer.Option(min=0.0, max=LARGEST, help="N.m; Coulomb friction [default: 5 % of the torque]")
-    ] = None,
-    viscous: Annotated[
-        float | None,
-        typer.Option(min=0.0, max=LARGEST, help="N.m.s/rad; viscous friction [default: 2 % of torque/speed]"),
-    ] = None,
-    inertia: Annotated[
-        float | None, typer.Option(min=1e-12, max=LARGEST, help="kg.m2; moved inertia [default: 1 % of torque/speed]")
-    ] = None,
-    moment_arm: Annotated[
-        float, typer.Option(min=1e-4, max=10.0, help="m; 1 if the recording has torque as tendon force")
-    ] = 1.0,
+    options: DescribeOptions,
 ) -> None:
     """Write a description to begin with: of a machine with one joint, or of a finger.
 
@@ -75,29 +65,20 @@ def describe_files(
     if not name.strip() or any(ord(letter) < 32 for letter in name):
         raise InputError(f"describe {what}: --name = {name!r}: expected a name")
     if what == FINGER:
-        _describe_finger(output, name, joints, tendon or [], table)
+        _describe_finger(output, name, options)
         return
-    numbers = {"torque": torque, "speed": speed, "coulomb": coulomb, "viscous": viscous, "inertia": inertia}
-    if recording is None:
+    keys = ("torque", "speed", "coulomb", "viscous", "inertia")
+    numbers = {key: getattr(options, key) for key in keys if getattr(options, key) is not None}
+    if options.recording is None:
         files.check_output(output)
-        document = recorded.joint_description(
-            name,
-            1.0 if torque is None else torque,
-            5.0 if speed is None else speed,
-            coulomb=coulomb,
-            viscous=viscous,
-            inertia=inertia or 0.0,
-            moment_arm=moment_arm,
-        )
+        document = recorded.joint_description(name, **numbers, moment_arm=options.moment_arm)
     else:
-        for option, value in numbers.items():
-            if value is not None:
-                raise InputError(
-                    f"describe {JOINT}: --{option}: not an option beside --recording, which holds the number"
-                )
+        for key in numbers:
+            raise InputError(f"describe {JOINT}: --{key}: not an option beside --recording, which holds the number")
+        recording = Path(options.recording)
         files.check_format(recording)
         files.check_output(output, recording)
-        document = recorded.describe_recorded_joint(name, recorded.read_recording(recording), moment_arm)
+        document = recorded.describe_recorded_joint(name, recorded.read_recording(recording), options.moment_arm)
     files.write_text(output, model.description_text(document))
     law = document["joints"][0]["friction"]
     say(
@@ -107,14 +88,15 @@ def describe_files(
     print_json(lambda: document)
 
 
-def _describe_finger(output: Path, name: str, joints: str | None, tendons: list[str], table: Path | None) -> None:
+def _describe_finger(output: Path, name: str, options: DescribeOptions) -> None:
     """Write the description of a finger whose numbers nobody knows yet."""
-    if not joints or (table is None) == (not tendons):
+    joints, tables = options.joints, options.files("table")
+    if not joints or bool(tables) == bool(options.tendon):
         raise InputError(f"describe {FINGER}: expected --joints, and either --tendon for each tendon or --table")
-    inputs = [] if table is None else [table]
-    files.check_output(output, *inputs)
-    text = "" if table is None else table.read_text(encoding="utf-8")
-    lines = tendons or [line for line in text.splitlines() if line.strip()]
+    files.check_output(output, *tables)
+    lines = [*options.tendon]
+    for table in tables:
+        lines = [line for line in table.read_text(encoding="utf-8").splitlines() if line.strip()]
     document = model.starting_finger(name, [joint.strip() for joint in joints.split(",")], lines)
     files.write_text(output, model.description_text(document))
     say(
@@ -130,45 +112,14 @@ def _describe_finger(output: Path, name: str, joints: str | None, tendons: list[
 MJCF = "mjcf"
 Format = Annotated[str, typer.Argument(metavar="mjcf", help="format of the model: MuJoCo's")]
 ModelFile = Annotated[Path, typer.Argument(metavar="MODEL.xml", help="MuJoCo model")]
-NAMES = "NAMES"  # separated by commas; the option may also be repeated
 
 
-@command("import")
+@command("import", ImportOptions)
 def import_model(
     kind: Format,
     model: ModelFile,
     output: Annotated[Path, output_option("FINGER.json", "description to write")],
-    joints: Annotated[
-        list[str] | None,
-        typer.Option(metavar=NAMES, help="joints, base first: mcp,pip [default: the one chain that tendons move]"),
-    ] = None,
-    tendons: Annotated[
-        list[str] | None,
-        typer.Option(metavar=NAMES, help="tendons of the finger [default: all driven ones that move it]"),
-    ] = None,
-    bidirectional: Annotated[
-        list[str] | None, typer.Option(metavar=NAMES, help="tendons that are cable loops, which pull either way")
-    ] = None,
-    range_: Annotated[
-        list[str] | None,
-        typer.Option("--range", metavar="JOINT=LOW:HIGH", help="rad; joint range, in place of the model's limits"),
-    ] = None,
-    tip: Annotated[
-        str | None, typer.Option(metavar="NAME", help="site, geom or body at the fingertip; writes links and tip")
-    ] = None,
-    gravity: Annotated[bool, typer.Option("--gravity", help="write the weight of the links as known load")] = False,
-    stiffness: Annotated[
-        float | None,
-        typer.Option(min=1e-3, max=1e12, metavar="N/m", help="N/m; of tendons whose stiffness the model does not have"),
-    ] = None,
-    arm_tolerance: Annotated[
-        float, typer.Option(min=0.0, max=1.0, metavar="SHARE", help="a moment arm that varies less is constant")
-    ] = 0.02,
-    threshold: Annotated[
-        float,
-        typer.Option(min=1e-9, max=1e6, metavar="N.m", help="N.m; contact threshold to begin with, of all joints"),
-    ] = 0.03,
-    name: Annotated[str | None, typer.Option(metavar="NAME", help="of the finger [default: the model's]")] = None,
+    options: ImportOptions,
 ) -> None:
     """Make a finger description from joints and tendons of a MuJoCo model.
 
@@ -177,19 +128,7 @@ def import_model(
     """
     _check_kind("import", kind)
     files.check_output(output, model)
-    settings = mjcf.ImportSettings(
-        joints=_names(joints or []),
-        tendons=None if tendons is None else _names(tendons),
-        ranges=dict(_range(text) for text in range_ or []),
-        bidirectional=_names(bidirectional or []),
-        tip=tip,
-        gravity=gravity,
-        stiffness=stiffness,
-        tolerance=arm_tolerance,
-        threshold=threshold,
-        name=name,
-    )
-    finger = mjcf.import_finger(model, settings)
+    finger = mjcf.import_finger(model, options)
     files.write_text(output, description_text(finger.data))
     _say_rows(model, "", finger.notes)
     for sentence in finger.warnings:
@@ -237,20 +176,3 @@ def _check_kind(command: str, kind: str) -> None:
 def _say_rows(file: Path, what: str, rows: Sequence[str]) -> None:
     for row in rows:
         say(f"{file}: {what}{row}")
-
-
-def _names(texts: Sequence[str]) -> list[str]:
-    """Return the names of an option that may be repeated and may hold several names."""
-    return [name.strip() for text in texts for name in text.split(",") if name.strip()]
-
-
-def _range(text: str) -> tuple[str, tuple[float, float]]:
-    joint, _, limits = text.rpartition("=")
-    low, _, high = limits.partition(":")
-    try:
-        span = float(low), float(high)
-    except ValueError:
-        raise InputError(f"--range {text}: expected JOINT=LOW:HIGH in rad, such as mcp=-0.3:1.4") from None
-    if not joint or not -1e6 < span[0] < span[1] < 1e6:
-        raise InputError(f"--range {text}: expected JOINT=LOW:HIGH with LOW below HIGH, in rad")
-    return joint, span

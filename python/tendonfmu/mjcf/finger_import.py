@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -32,6 +32,7 @@ from tendonfmu.mjcf.finger_parts import (
     stiffness_of,
 )
 from tendonfmu.model import native
+from tendonfmu.options import ImportOptions
 
 FORMAT = "tendonfmu-finger-1"
 UNLIMITED = 1.0  # rad (m); range on both sides of the reference of a joint without limits
@@ -39,23 +40,6 @@ STRIBECK = 0.1  # rad/s; without effect as long as static equals coulomb
 LONGEST_ARM = 0.3  # m; larger coefficients of fixed tendons are no lengths, such as 1 where joints are coupled
 MISSED = 0.02  # share of the largest holding torque that `gravity` rows may miss without a warning
 OF_EVERY_MODEL = "shapes and contacts, the actuators' dynamics, sensors, keyframes: no part of a description"
-
-
-@dataclass(frozen=True)
-class ImportSettings:
-    """What is taken from a model."""
-
-    joints: Sequence[str] = ()  # names of joints, base first; without any the one chain that driven tendons move
-    tendons: Sequence[str] | None = None  # names of tendons; None takes all that are driven and move a joint
-    # ranges of joints by name (rad), in place of the model's limits
-    ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    bidirectional: Sequence[str] = ()  # names of tendons that are cable loops
-    tip: str | None = None  # site, geom or body that is the fingertip; None leaves `links` out
-    gravity: bool = False  # whether to write the links' weight as rows `gravity`
-    stiffness: float | None = None  # of tendons whose stiffness the model does not have (N/m); None takes them as rigid
-    tolerance: float = 0.02  # share up to which a moment arm counts as constant
-    threshold: float = 0.03  # `contact.threshold` of all joints (N·m)
-    name: str | None = None  # of the finger; None takes the model's
 
 
 @dataclass(frozen=True)
@@ -81,17 +65,17 @@ class ImportedFinger:
         }
 
 
-def import_finger(path: Path, settings: ImportSettings) -> ImportedFinger:
+def import_finger(path: Path, settings: ImportOptions) -> ImportedFinger:
     """Make a finger description from a MuJoCo model."""
     model = CompiledModel(path)
-    joints = _chain(model, settings.joints)
-    ranges, notes = joint_ranges(model, joints, settings.ranges)
+    joints = _chain(model, _names(settings.joints))
+    ranges, notes = joint_ranges(model, joints, dict(map(_range, settings.range_)))
     angles = sampled_angles(ranges)
-    tendons = choose_tendons(model, joints, angles, settings.tendons)
-    for name in settings.bidirectional:
+    tendons = choose_tendons(model, joints, angles, _names(settings.tendons) or None)
+    for name in _names(settings.bidirectional):
         if model.tendon_named(name) not in tendons:
             raise InputError(f"{path}: --bidirectional {name}: no such tendon; expected one of the finger's")
-    arms = moment_arms(model, joints, tendons, angles, settings.tolerance)
+    arms = moment_arms(model, joints, tendons, angles, settings.arm_tolerance)
     _check_moved(model, joints, arms)
     links = None if settings.tip is None else _links(model, joints, settings.tip)
     weight, warnings = _weight(model, joints, angles, links) if settings.gravity else ([], [])
@@ -111,9 +95,26 @@ def import_finger(path: Path, settings: ImportSettings) -> ImportedFinger:
     return ImportedFinger(
         data=data,
         notes=[*notes, *_sources(model, joints, tendons, settings)],
-        warnings=[*_arm_warnings(joints, tendons, arms, ranges, settings.tolerance), *warnings],
+        warnings=[*_arm_warnings(joints, tendons, arms, ranges, settings.arm_tolerance), *warnings],
         left_out=left_out(model, joints, tendons, angles, settings.gravity, links is not None),
     )
+
+
+def _names(texts: Sequence[str]) -> list[str]:
+    """Return the names of an option that may be repeated and may hold several names."""
+    return [name.strip() for text in texts for name in text.split(",") if name.strip()]
+
+
+def _range(text: str) -> tuple[str, tuple[float, float]]:
+    joint, _, limits = text.rpartition("=")
+    low, _, high = limits.partition(":")
+    try:
+        span = float(low), float(high)
+    except ValueError:
+        raise InputError(f"--range {text}: expected JOINT=LOW:HIGH in rad, such as mcp=-0.3:1.4") from None
+    if not joint or not -1e6 < span[0] < span[1] < 1e6:
+        raise InputError(f"--range {text}: expected JOINT=LOW:HIGH with LOW below HIGH, in rad")
+    return joint, span
 
 
 # --- joints -----------------------------------------------------------------------------------------------------------
@@ -217,12 +218,10 @@ def _check_moved(model: CompiledModel, joints: Sequence[Joint], arms: Sequence[S
             raise InputError(f"{model.path}: joint {joint.name}: moved by none of the tendons; expected {expected}")
 
 
-def _tendon(
-    model: CompiledModel, tendon: Tendon, arms: Sequence[MomentArm], settings: ImportSettings
-) -> dict[str, Any]:
+def _tendon(model: CompiledModel, tendon: Tendon, arms: Sequence[MomentArm], settings: ImportOptions) -> dict[str, Any]:
     stiffness, _ = stiffness_of(model, tendon, settings.stiffness)
     row = {"name": tendon.name, "stiffness": stiffness, "moment_arms": [arm.arm for arm in arms]}
-    return row | ({"bidirectional": True} if tendon.name in settings.bidirectional else {})
+    return row | ({"bidirectional": True} if tendon.name in _names(settings.bidirectional) else {})
 
 
 def _tendon_rows(
@@ -270,7 +269,7 @@ def _arm_warnings(
 
 
 def _sources(
-    model: CompiledModel, joints: Sequence[Joint], tendons: Sequence[Tendon], settings: ImportSettings
+    model: CompiledModel, joints: Sequence[Joint], tendons: Sequence[Tendon], settings: ImportOptions
 ) -> Iterator[str]:
     sources: dict[str, list[str]] = {}
     for tendon in tendons:

@@ -11,10 +11,10 @@ from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from .columns import GROUPS, Nis, RecordingEntry, RoutingEntry, Whiteness
-    from .converters import convert_file
     from .converters.column_map import read_log_format
     from .converters.inspection import Inspection, inspect_log
     from .converters.lerobot_log import LeRobotLog
+    from .converters.machines import convert_file
     from .converters.one_joint import describe_joint, describe_recorded_joint, joint_description
     from .converters.proposal import (
         Proposal,
