@@ -39,7 +39,10 @@ UNLIMITED = 1.0  # rad (m); range on both sides of the reference of a joint with
 STRIBECK = 0.1  # rad/s; without effect as long as static equals coulomb
 LONGEST_ARM = 0.3  # m; larger coefficients of fixed tendons are no lengths, such as 1 where joints are coupled
 MISSED = 0.02  # share of the largest holding torque that `gravity` rows may miss without a warning
-OF_EVERY_MODEL = "shapes and contacts, the actuators' dynamics, sensors, keyframes: no part of a description"
+OF_EVERY_MODEL = (
+    "limits, terms of higher order, damping and armature of tendons, springs beside their drives, shapes and contacts, "
+    "the actuators' dynamics, sensors, keyframes: no part of a description"
+)
 
 
 @dataclass(frozen=True)
@@ -341,9 +344,6 @@ def left_out(
 
 
 def _of_joints(model: CompiledModel, joints: Sequence[Joint], angles: Numbers) -> Iterator[str]:
-    yield from _named("joint", [joint.name for joint in joints if joint.limits], "limits")
-    nonlinear = [joint.name for joint in joints if joint.is_nonlinear]
-    yield from _named("joint", nonlinear, "stiffness or damping of higher order")
     model.place(joints, (angles.min(axis=0) + angles.max(axis=0)) / 2)
     matrix = model.inertia(joints)
     bare = [j for j, joint in enumerate(joints) if not joint.armature]
@@ -360,17 +360,8 @@ def _of_tendons(
 ) -> Iterator[str]:
     moves = moved_velocities(model, joints, angles)
     velocities = [joint.velocity for joint in joints]
-    yield from _named("tendon", [tendon.name for tendon in tendons if tendon.is_limited], "limits of the length")
     for tendon in tendons:
-        if tendon.damping:
-            yield f"tendon {tendon.name}: damping {tendon.damping:g} N·s/m: no viscous friction without a tendon force"
-        if tendon.armature:
-            yield f"tendon {tendon.name}: armature {tendon.armature:g} kg"
-        if tendon.stiffness and any(actuator.tendon == tendon.index for actuator in model.actuators):
-            yield f"tendon {tendon.name}: spring of {tendon.stiffness:g} N/m beside its actuator"
         motors = motors_of(model, tendon)
-        if tendon.frictionloss and motors:
-            yield f"tendon {tendon.name}: frictionloss {tendon.frictionloss:g} N of the spring between motor and finger"
         for joint in model.joints:
             if joint.velocity not in velocities and moves[tendon.index, joint.velocity] and joint not in motors:
                 yield f"tendon {tendon.name}: also moves joint {joint.name}, which is not in --joints"
@@ -397,8 +388,3 @@ def _weight_left_out(model: CompiledModel, joints: Sequence[Joint], angles: Numb
     if largest.max() > WEIGHTLESS:
         sizes = ", ".join(f"{joint.name} {1e3 * size:.3g}" for joint, size in zip(joints, largest, strict=True))
         yield f"weight of the links, at most (mN·m): {sizes}; --gravity takes it"
-
-
-def _named(kind: str, names: Sequence[str], what: str) -> Iterator[str]:
-    if names:
-        yield f"{kind} {', '.join(names)}: {what}"

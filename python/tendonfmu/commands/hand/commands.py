@@ -26,11 +26,11 @@ from tendonfmu.commands import console
 from tendonfmu.commands.check import show_whether_it_belongs
 from tendonfmu.commands.command import is_hand
 from tendonfmu.commands.detection import ScoreWarning, score
-from tendonfmu.commands.hand import page as pages
+from tendonfmu.commands.hand import results as pages
 from tendonfmu.commands.hand.description import Hand, HandPart, read_hand
 from tendonfmu.commands.hand.recordings import run_hand as run_fingers
 from tendonfmu.commands.hand.recordings import split_parts
-from tendonfmu.commands.hand.ssp import build_hand_ssp
+from tendonfmu.commands.hand.results import build_hand_ssp
 from tendonfmu.errors import InputError
 from tendonfmu.options import CalibrateOptions, DiagnoseOptions, RunOptions, ScoreOptions
 
