@@ -25,7 +25,7 @@ from evidence.cases import DATA, run_cases
 from evidence.part import Figures, Part
 from tendonfmu.arrays import Numbers
 from tendonfmu.recordings import describe_recorded_joint
-from tendonfmu.recordings.converters import convert_file
+from tendonfmu.recordings.converters.machines import convert_file
 
 HERE = Path(__file__).parent / "machine_data"
 ENCODER = 3  # kinematics: angle and velocity are measured
@@ -68,7 +68,7 @@ PRETENSION = 13.0  # N, the least whole number at which the closing cable always
 def jaw_run(name: str) -> tf.Recording:
     """A run of the jaw, up to its jam."""
     file = DATA / "davinci_tool" / "Tool_4_Maryland_L_4" / f"{name}.TXT"
-    recording = of_columns(file.with_name(name), convert_file("davinci", file, {"pretension": PRETENSION}))
+    recording = of_columns(file.with_name(name), convert_file("davinci", file, pretension=PRETENSION))
     return recording[: JAM[name]] if name in JAM else recording
 
 
@@ -90,7 +90,7 @@ DECIMATION = 10  # from 1 kHz, as the authors decimate
 def emps_run(name: str) -> tf.Recording:
     """A file of the carriage at 1 kHz: one of its causes is a delay of less than a sample at 100 Hz."""
     file = DATA / "emps" / f"{name}.mat"
-    return of_columns(file, convert_file("emps", file, {"decimation": 1}))
+    return of_columns(file, convert_file("emps", file, decimation=1))
 
 
 def emps() -> Machine:

@@ -22,7 +22,7 @@ from fmpy.util import read_csv
 from importers import IMPORTERS, Importer, Task, flat_rows
 
 import tendonfmu as tf
-from tendonfmu.fmu.reference_results import ABSOLUTE, FOLDER, RELATIVE
+from tendonfmu.fmu.running import ABSOLUTE, FOLDER, RELATIVE
 
 ROOT = Path(__file__).resolve().parent.parent
 VERSIONS = {2: "2.0", 3: "3.0"}

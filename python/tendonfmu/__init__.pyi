@@ -5,6 +5,11 @@ from .commands.calibrate import calibrate as calibrate
 from .commands.check import CheckResult as CheckResult
 from .commands.check import check as check
 from .commands.convert import convert as convert
+from .commands.detection import ScoreResult as ScoreResult
+from .commands.detection import ScoreWarning as ScoreWarning
+from .commands.detection import TuneResult as TuneResult
+from .commands.detection import score as score
+from .commands.detection import tune as tune
 from .commands.diagnose import Diagnosis as Diagnosis
 from .commands.diagnose import DiagnosisWarning as DiagnosisWarning
 from .commands.diagnose import diagnose as diagnose
@@ -19,11 +24,6 @@ from .commands.live import Runner as Runner
 from .commands.live import Sample as Sample
 from .commands.run import RunResult as RunResult
 from .commands.run import run as run
-from .commands.score import ScoreResult as ScoreResult
-from .commands.score import ScoreWarning as ScoreWarning
-from .commands.score import score as score
-from .commands.tune import TuneResult as TuneResult
-from .commands.tune import tune as tune
 from .detect import TuneWarning as TuneWarning
 from .errors import InputError as InputError
 from .errors import InputWarning as InputWarning

@@ -375,3 +375,23 @@ class ScoreOptions(Options):
     kinematics: int = _kinematics()
     seed: int = _seed()
     progress: Callable[[int, int], None] | None = _unseen("called with runs done and runs")
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class ImportOptions(Options):
+    """Options of `import`. NAMES are separated by commas."""
+
+    joints: Sequence[str] = option(
+        (), "joints, base first: mcp,pip [default: the one chain that tendons move]", "NAMES"
+    )
+    tendons: Sequence[str] = option((), "tendons of the finger [default: all driven ones that move it]", "NAMES")
+    bidirectional: Sequence[str] = option((), "tendons that are cable loops, which pull either way", "NAMES")
+    range_: Sequence[str] = option((), "rad; joint range, in place of the model's limits", "JOINT=LOW:HIGH")
+    tip: str | None = option(None, "site, geom or body at the fingertip; writes links and tip", "NAME")
+    gravity: bool = option(False, "write the weight of the links as known load")
+    stiffness: float | None = option(
+        None, "N/m; of tendons whose stiffness the model does not have [default: rigid]", "N/m", 1e-3, 1e12
+    )
+    arm_tolerance: float = option(0.02, "a moment arm that varies less is constant", "SHARE", 0.0, 1.0)
+    threshold: float = option(0.03, "N.m; contact threshold to begin with, of all joints", "N.m", 1e-9, 1e6)
+    name: str | None = option(None, "of the finger [default: the model's]", "NAME")

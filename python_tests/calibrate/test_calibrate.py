@@ -24,8 +24,8 @@ from tendonfmu.model.description import read_finger
 from tendonfmu.options import CalibrateOptions
 from tendonfmu.recordings.prepared import Held, prepare
 from tendonfmu.recordings.recording import Recording, at_rows, read_recording
-from tendonfmu.report.numbers import rounded, together
-from tendonfmu.tasks.steps import Steps
+from tendonfmu.report.kit import rounded, together
+from tendonfmu.tasks.phases import Steps
 
 
 def test_the_missing_weight_is_built_in_and_the_error_falls(calibrated: tuple[Calibration, Path]) -> None:

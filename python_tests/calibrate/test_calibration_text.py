@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from tendonfmu.calibration.text import size_rows, tiles, verdict
-from tendonfmu.report.numbers import together
+from tendonfmu.report.kit import together
 
 
 def report(given: float, calibrated: float, causes: int, alarms: int = 0) -> dict[str, Any]:

@@ -46,8 +46,8 @@ CALLS = {
     "fit": ("{finger} {recording} -o fitted.json", "tendonfmu.commands.fit.fit"),
     "calibrate": ("{finger} {recording} -o calibration", "tendonfmu.calibration.calibrate"),
     "diagnose": ("{finger} {recording} -o diagnosis", "tendonfmu.commands.diagnose.diagnose"),
-    "tune": ("{finger} {recording} -o tuned.json", "tendonfmu.commands.tune.tune"),
-    "score": ("{finger} {recording} -o score.json", "tendonfmu.commands.score.score"),
+    "tune": ("{finger} {recording} -o tuned.json", "tendonfmu.commands.detection.tune"),
+    "score": ("{finger} {recording} -o score.json", "tendonfmu.commands.detection.score"),
     "demo": ("-o demo", "tendonfmu.commands.demo.Story"),
 }
 LEARNING = ("fit", "calibrate", "diagnose", "tune")  # what takes seconds

@@ -211,7 +211,7 @@ def test_at_rest_means_that_no_friction_slides() -> None:
 
 
 def describe_joint_of(threshold: float) -> dict[str, Any]:
-    data = joint_description("axis", 4.0, 5.0)
+    data = joint_description("axis", torque=4.0, speed=5.0)
     return data | {"velocity_threshold": {"tendon": threshold, "joint": threshold}}
 
 

@@ -16,7 +16,7 @@ from real_browser import Elements
 from small_hand import FINGERS, worn_columns, write_worn_hand
 from tendonfmu import diagnosis
 from tendonfmu.commands.hand.commands import split_files
-from tendonfmu.commands.hand.page import (
+from tendonfmu.commands.hand.results import (
     CALIBRATION,
     PAGE,
     PartRow,

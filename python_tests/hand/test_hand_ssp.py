@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 import tendonfmu as tf
 from small_hand import FINGERS, RATE, write_wrist_hand
-from tendonfmu.commands.hand.ssp import START_VALUES, build_hand_ssp
+from tendonfmu.commands.hand.results import START_VALUES, build_hand_ssp
 
 STEPS = 150
 STEP = 1.0 / RATE  # s

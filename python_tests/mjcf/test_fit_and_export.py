@@ -12,7 +12,8 @@ from optional_parts import require
 require("mujoco")
 
 from mujoco_friction import guess, machine, record, recover
-from tendonfmu.mjcf import ImportSettings, export_numbers, import_finger
+from tendonfmu.mjcf import export_numbers, import_finger
+from tendonfmu.options import ImportOptions
 
 INTERVAL = 1.96  # standard errors; 95 %
 
@@ -30,7 +31,7 @@ def test_a_replay_keeps_what_makes_the_model_better_and_no_other(tmp_path: Path)
     record(machine(), tmp_path / "free.parquet", 2)
     (tmp_path / "guess.xml").write_text(guess(), encoding="utf-8")
     (tmp_path / "true.xml").write_text(machine(), encoding="utf-8")
-    true = import_finger(tmp_path / "true.xml", ImportSettings(joints=("mcp", "pip"))).data
+    true = import_finger(tmp_path / "true.xml", ImportOptions(joints=("mcp", "pip"))).data
     true["joints"][1]["friction"] |= {"static": 0.016, "coulomb": 0.016}
     (tmp_path / "finger.json").write_text(json.dumps(true), encoding="utf-8")
     files = (tmp_path / name for name in ("finger.json", "guess.xml", "out.xml"))

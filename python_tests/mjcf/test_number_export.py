@@ -19,10 +19,11 @@ from lxml import etree
 from command import Call
 from mjcf_models import fixed_model
 from tendonfmu.errors import InputError
-from tendonfmu.mjcf.finger_import import ImportSettings, import_finger
+from tendonfmu.mjcf.finger_import import import_finger
 from tendonfmu.mjcf.number_export import Export, export_numbers
+from tendonfmu.options import ImportOptions
 
-SETTINGS = ImportSettings(joints=("mcp", "pip"))
+SETTINGS = ImportOptions(joints=("mcp", "pip"))
 
 
 def exported(folder: Path, data: dict[str, Any], model: str = "model.xml", output: str = "out.xml") -> Export:

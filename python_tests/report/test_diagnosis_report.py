@@ -19,7 +19,7 @@ from tendonfmu.files import report_text
 from tendonfmu.report.diagnosis_files import build_report
 from tendonfmu.report.diagnosis_text import left_of, left_sentence, lines, tables, unit_of
 from tendonfmu.report.diagnosis_types import EFFECTS
-from tendonfmu.report.numbers import percent, percent_interval, probability
+from tendonfmu.report.kit import percent, percent_interval, probability
 from tendonfmu.statistics.intervals import Interval
 
 THRESHOLDS = (5e-4, 0.01)  # m/s, rad/s

@@ -15,12 +15,10 @@ from tendonfmu.model import finger_from_data, native
 from tendonfmu.model.friction_places import Effect, effects
 from tendonfmu.report.fit_figures import (
     SHOWN,
-    correlation,
     law_sheets,
-    strongest_pairs,
     torque_sheets,
 )
-from tendonfmu.report.numbers import rms
+from tendonfmu.report.kit import rms
 
 MILLI = 1e3
 EDGE = "tendons[1].edge_friction[1]"  # with a law at each of two angles
@@ -128,18 +126,3 @@ def test_bands_are_what_draws_from_the_covariance_give(fit: FitPicture, path: st
         curves.append(np.sum(weights * np.column_stack(laws), axis=1))
     np.testing.assert_allclose(drawn.fitted, np.mean(curves, axis=0), rtol=0.01)
     np.testing.assert_allclose((drawn.high - drawn.fitted) / CONFIDENCE, np.std(curves, axis=0), rtol=0.08)
-
-
-# --- errors and correlation -------------------------------------------------------------------------------------------
-
-
-def test_the_strongest_pair_comes_first(fit: FitPicture) -> None:
-    covariance = np.diag(np.diag(fit.covariance))
-    for a, b, value in ((0, 3, -0.97), (1, 2, 0.8)):
-        covariance[a, b] = covariance[b, a] = value * np.sqrt(covariance[a, a] * covariance[b, b])
-    first, second, third = strongest_pairs(dataclasses.replace(fit, covariance=covariance), 3)
-    assert (first.correlation, second.correlation, third.correlation) == pytest.approx((-0.97, 0.8, 0.0))
-    for name, k in ((first.first, 0), (first.second, 3)):
-        assert name.rsplit(".", 1)[0] == fit.unknowns[k].path.rsplit(".", 1)[0]
-    found = correlation(np.array([[4.0, 0.0, 2.0], [0.0, 0.0, 0.0], [2.0, 0.0, 4.0]]))
-    np.testing.assert_array_equal(found, [[1.0, 0.0, 0.5], [0.0, 0.0, 0.0], [0.5, 0.0, 1.0]])

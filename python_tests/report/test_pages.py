@@ -23,7 +23,7 @@ from tendonfmu.estimate.fit_report import FitPicture
 from tendonfmu.report.diagnosis_page import diagnosis_page, waterfall_of
 from tendonfmu.report.diagnosis_text import names_of
 from tendonfmu.report.fit_page import fit_page, residual_tables
-from tendonfmu.report.numbers import percent_interval
+from tendonfmu.report.kit import percent_interval
 from tendonfmu.report.run_page import run_page, run_report
 from tendonfmu.statistics.intervals import Interval
 

@@ -14,7 +14,8 @@ import numpy as np
 from mjcf_models import ARMS, fixed_model
 from tendonfmu.estimate import FitWarning, FrictionFit
 from tendonfmu.files import write_table
-from tendonfmu.mjcf import ImportSettings, export_numbers, import_finger
+from tendonfmu.mjcf import export_numbers, import_finger
+from tendonfmu.options import ImportOptions
 
 SECONDS, EVERY, SETTLE = 25.0, 4, 1.0  # s, steps a sample, s
 STIFFNESS = 6000.0  # N/m
@@ -80,7 +81,7 @@ def recover(folder: Path, seed: int) -> list[Recovered]:
     """What import, fit and export make of a recording; leaves its files in the folder."""
     record(machine(), folder / "free.parquet", seed)
     (folder / "guess.xml").write_text(guess(), encoding="utf-8")
-    start = import_finger(folder / "guess.xml", ImportSettings(joints=("mcp", "pip"))).data
+    start = import_finger(folder / "guess.xml", ImportOptions(joints=("mcp", "pip"))).data
     start["bias"] = {"drift_variance": 1e-8, "noise_std": 0.001, "noise_time": 0.01}
     (folder / "start.json").write_text(json.dumps(start), encoding="utf-8")
     fitting = FrictionFit(folder / "start.json", kinematics=3, effective_samples=True, fix=["*.inertia"])

@@ -63,7 +63,6 @@ def _file(untested: str, path: Path, source: str) -> Part:
 
 PARTS = {
     "mujoco": _package("fingers of MuJoCo", "mujoco", "locks/interop.lock"),
-    "rerun": _package("runs in the viewer Rerun", "rerun", "locks/wheel.lock"),
     "ecos": _package("our FMUs in ecos", "ecospy", "locks/interop.lock and the library libtbb12"),
     "libcosim": _package("our FMUs in libcosim", "libcosimpy", "locks/interop.lock"),
     "pythonfmu": _package("FMUs of pythonfmu", "pythonfmu", "locks/interop.lock"),

@@ -29,7 +29,7 @@ from pathlib import Path
 from typing import Any
 
 # Packages whose module has another name.
-MODULES = {"mcap-protobuf-support": "mcap_protobuf", "lz4": "lz4.frame", "rerun-sdk": "rerun"}
+MODULES = {"mcap-protobuf-support": "mcap_protobuf", "lz4": "lz4.frame"}
 
 SIMULATED_TIME = 5.0  # s
 

@@ -1,4 +1,4 @@
-"""The command `build`: a finger, or a simulated one, as an FMU."""
+"""The commands `build` and `simulate`: FMUs, and recordings of simulated fingers."""
 
 from __future__ import annotations
 
@@ -8,9 +8,19 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from tendonfmu import fmu, model, simulate
-from tendonfmu.commands.command import Subject, command, output_option
-from tendonfmu.commands.console import print_json, say
+import typer
+
+from tendonfmu import files, fmu, model, simulate
+from tendonfmu.commands.command import Progress, Subject, command, output_option
+from tendonfmu.commands.console import (
+    check_second_file,
+    check_table,
+    name_of,
+    print_json,
+    progress_bar,
+    say,
+    write_table,
+)
 from tendonfmu.errors import InputError, InputWarning
 from tendonfmu.files import are, check_output, counted
 from tendonfmu.options import BuildOptions, keywords
@@ -139,3 +149,32 @@ def build_files(
         print_json(lambda: fmu.c_array_report(file, model.read_finger(file), output))
     else:
         print_json(lambda: fmu.fmu_report(file, output))
+
+
+# --- a recording of a simulated finger --------------------------------------------------------------------------------
+
+
+@command("simulate", reads=("rig",))
+def simulate_files(
+    rig: Annotated[Path, typer.Argument(metavar="RIG.json", help="rig of a simulated finger")],
+    output: Annotated[Path, output_option("REC.parquet", "recording, .csv or .parquet")],
+    truth: Annotated[
+        Path | None, typer.Option(metavar="TRUTH.parquet", help="true signals to write, .csv or .parquet")
+    ] = None,
+    progress: Progress = None,
+) -> None:
+    """Simulate a finger and write the recording. The same rig gives the same numbers."""
+    read = simulate.read_rig(rig)
+    check_table(output, *read.files)
+    if truth is not None:
+        files.check_format(truth)
+        check_second_file(truth, output, "recording and truth", *read.files)
+    with progress_bar("samples", progress) as show:
+        result = simulate.simulate(read, truth=truth is not None, progress=show)
+    if truth is not None and result.truth is not None:
+        write_table(truth, result.truth)
+    write_table(output, result.recording)
+    written = {"output": output} if truth is None else {"output": output, "truth": truth}
+    print_json(lambda: result.report(read, written))
+    for line in result.summary(read):
+        say(f"{name_of(output)}: {line}")

@@ -1,5 +1,7 @@
 """The command `convert`: any log as a recording."""
 
+# ruff: noqa: RUF009 (`option` makes a field)
+
 from __future__ import annotations
 
 import json
@@ -7,6 +9,7 @@ import os
 import re
 import tempfile
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,8 +18,9 @@ import typer
 from tendonfmu import files, model
 from tendonfmu import recordings as recorded
 from tendonfmu.commands import console
-from tendonfmu.commands.command import command
+from tendonfmu.commands.command import command, output_option
 from tendonfmu.errors import InputError, OutputError
+from tendonfmu.options import File, Options, option
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -25,6 +29,13 @@ if TYPE_CHECKING:
 
 TABLE, LEROBOT = "table", "lerobot"  # the formats whose columns a map describes
 INSPECT = "inspect"
+TAKEN = {  # format -> its options
+    "davinci": ("radius", "pretension"),
+    "emps": ("mass", "decimation"),
+    TABLE: ("map", "finger"),
+    LEROBOT: ("map", "episodes"),
+    INSPECT: ("map", "episodes"),
+}
 CONVERSION = "tendonfmu-conversion-1"  # format of the report
 
 
@@ -52,7 +63,32 @@ def convert(log: str | os.PathLike[str], map: Mapping[str, Any] | str | os.PathL
     return recorded.Recording.from_frame(files.frame_of(columns), name=str(log))
 
 
-@command("convert", reads=("file",))
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class ConvertOptions(Options):
+    """Options of `convert`; each format takes those of `TAKEN`."""
+
+    radius: float | None = option(
+        None, "m; davinci: radius of the pulley with the recorded torque [default: 0.005]", None, 1e-6, 1.0
+    )
+    pretension: float | None = option(
+        None,
+        "N; davinci: pretension of the loop, records the closing cable only [default: 0, net force]",
+        None,
+        0.0,
+        1e6,
+    )
+    mass: float | None = option(
+        None, "kg; emps: moved mass, whose inertial force is known load [default: 95.1089]", None, 0.0, 1e6
+    )
+    decimation: int | None = option(None, "emps: keep one in so many samples, smoothed [default: 10]", None, 1, 1000)
+    map_: File | None = option(
+        None, 'name, unit and sign of each column; inspect: how a text is written, of its "log"', "MAP.json"
+    )
+    finger: File | None = option(None, "table: description of the one-joint machine to write", "FINGER.json")
+    episodes: str | None = option(None, "lerobot, inspect: episodes to read [default: all]", "0-9,12")
+
+
+@command("convert", ConvertOptions, reads=("file",))
 def convert_files(
     source: Annotated[str, typer.Argument(metavar="FORMAT", help="davinci, emps, table, lerobot, or inspect")],
     file: Annotated[
@@ -63,52 +99,14 @@ def convert_files(
             "for lerobot and inspect the folder of a LeRobot dataset",
         ),
     ],
+    options: ConvertOptions,
     output: Annotated[
         Path | None,
-        typer.Option(
-            "-o",
-            "--output",
-            metavar="REC.csv",
-            help="recording, .csv, .parquet or .mcap; lerobot: or a folder, for a recording of each episode; inspect: "
+        output_option(
+            "REC.csv",
+            "recording, .csv, .parquet or .mcap; lerobot: or a folder, for a recording of each episode; inspect: "
             "MAP.json to write",
         ),
-    ] = None,
-    radius: Annotated[
-        float | None,
-        typer.Option(
-            min=1e-6, max=1.0, help="m; davinci: radius of the pulley with the recorded torque [default: 0.005]"
-        ),
-    ] = None,
-    pretension: Annotated[
-        float | None,
-        typer.Option(
-            min=0.0,
-            max=1e6,
-            help="N; davinci: pretension of the loop, records the closing cable only [default: 0, net force]",
-        ),
-    ] = None,
-    mass: Annotated[
-        float | None,
-        typer.Option(
-            min=0.0, max=1e6, help="kg; emps: moved mass, whose inertial force is known load [default: 95.1089]"
-        ),
-    ] = None,
-    decimation: Annotated[
-        int | None, typer.Option(min=1, max=1000, help="emps: keep one in so many samples, smoothed [default: 10]")
-    ] = None,
-    map_: Annotated[
-        Path | None,
-        typer.Option(
-            "--map",
-            metavar="MAP.json",
-            help='name, unit and sign of each column; inspect: how a text is written, of its "log"',
-        ),
-    ] = None,
-    finger: Annotated[
-        Path | None, typer.Option(metavar="FINGER.json", help="table: description of the one-joint machine to write")
-    ] = None,
-    episodes: Annotated[
-        str | None, typer.Option(metavar="0-9,12", help="lerobot, inspect: episodes to read [default: all]")
     ] = None,
 ) -> None:
     """Convert a third-party recording or any log into a recording of tendonfmu.
@@ -117,47 +115,34 @@ def convert_files(
     LOG --map MAP.json -o REC.parquet converts it. convert lerobot FOLDER --map
     MAP.json -o DIR converts each episode of a LeRobot dataset.
     """
-    given = {"radius": radius, "pretension": pretension, "mass": mass, "decimation": decimation}
-    options = {name: value for name, value in given.items() if value is not None}
+    if source not in TAKEN:
+        raise InputError(f"convert: unknown format {source!r}; expected one of {', '.join(TAKEN)}")
+    given = {name.rstrip("_"): value for name, value in vars(options).items() if value is not None}
+    for name in given.keys() - TAKEN[source]:
+        expected = " or ".join(f"--{each}" for each in TAKEN[source])
+        raise InputError(f"convert {source}: --{name}: not an option of this format; expected {expected}")
     if source == INSPECT:
-        _refuse_options(source, {**options, "finger": finger}, "-o or --map")
-        report = _inspect(file, output, map_, episodes)
+        report = _inspect(file, output, options.map_, options.episodes)
     elif output is None:
         raise InputError(f"convert {source}: --output: missing; expected the recording to write, -o REC.parquet")
-    elif source == LEROBOT:
-        _refuse_options(source, {**options, "finger": finger}, "--map or --episodes")
-        report = _convert_table(source, file, output, map_, None, episodes)
-    elif source == TABLE:
-        _refuse_options(source, {**options, "episodes": episodes}, "--map or --finger")
-        report = _convert_table(source, file, output, map_, finger, None)
+    elif source in (TABLE, LEROBOT):
+        report = _convert_table(source, file, output, options)
     else:
-        _refuse_options(source, {"map": map_, "finger": finger, "episodes": episodes}, f"convert {TABLE}")
-        report = _convert_data_set(source, file, output, options)
+        console.check_table(output, file)
+        table = recorded.convert_file(source, file, **given)
+        console.write_table(output, table)
+        report = _written(output, len(table["time"]), float(table["time"][-1] - table["time"][0]), [])
     console.print_json(lambda: report)
 
 
-def _convert_data_set(source: str, file: Path, output: Path, options: Mapping[str, float]) -> dict[str, Any]:
-    console.check_table(output, file)
-    table = recorded.convert_file(source, file, options)
-    console.write_table(output, table)
-    return _written(output, len(table["time"]), float(table["time"][-1] - table["time"][0]), [])
-
-
-def _refuse_options(source: str, options: Mapping[str, Any], expected: str) -> None:
-    """Refuse the first option that was given and is not of this format."""
-    for name, value in options.items():
-        if value is not None:
-            raise InputError(f"convert {source}: --{name}: not an option of this format; expected {expected}")
-
-
-def _inspect(file: Path, output: Path | None, map_file: Path | None, episodes: str | None) -> dict[str, Any]:
+def _inspect(file: Path, output: Path | None, map_file: File | None, episodes: str | None) -> dict[str, Any]:
     """Print what is in a log, write the proposed map, and return both."""
     if output is not None:
         if output.suffix.lower() != ".json":
             raise InputError(f"{output}: unknown format {output.suffix!r}; expected a map, .json")
         files.check_output(output, file)
     log = None if episodes is None else recorded.LeRobotLog(file, chosen=episodes)
-    inspection = recorded.inspect_log(file, log, None if map_file is None else recorded.read_log_format(map_file))
+    inspection = recorded.inspect_log(file, log, None if map_file is None else recorded.read_log_format(Path(map_file)))
     proposal = recorded.propose(inspection)
     _print_inspection(inspection, proposal)
     for note in (*inspection.notes, *proposal.notes):
@@ -183,14 +168,14 @@ def _print_inspection(inspection: Inspection, proposal: Proposal) -> None:
     )
 
 
-def _convert_table(
-    source: str, file: Path, output: Path, map_file: Path | None, finger: Path | None, episodes: str | None
-) -> dict[str, Any]:
+def _convert_table(source: str, file: Path, output: Path, options: ConvertOptions) -> dict[str, Any]:
     """Convert a log or dataset by its map, and write the description of a one-joint machine."""
-    if map_file is None:
+    if options.map_ is None:
         raise InputError(
             f"convert {source}: --map: missing; expected a map of columns (JSON), see tendonfmu convert {INSPECT}"
         )
+    map_file, episodes = Path(options.map_), options.episodes
+    finger = None if options.finger is None else Path(options.finger)
     if source == LEROBOT and file.resolve() in (output.resolve(), *output.resolve().parents):
         raise InputError(f"{output}: a place in the dataset {file}; expected another one")
     if source == LEROBOT and output != console.DASH and output.suffix.lower() not in files.OUTPUTS:

@@ -27,9 +27,9 @@ from tendonfmu.commands.build import build
 from tendonfmu.commands.calibrate import CalibrateResult, calibrate
 from tendonfmu.commands.command import Progress, command, output_option
 from tendonfmu.commands.console import Bar, print_json, print_results, say, say_files, warn
+from tendonfmu.commands.detection import score
 from tendonfmu.commands.fit import fit
 from tendonfmu.commands.run import run
-from tendonfmu.commands.score import score
 from tendonfmu.files import check_output_folder, write_bytes, write_text
 from tendonfmu.model import read_finger
 from tendonfmu.tasks import forget_steps
@@ -74,7 +74,7 @@ class Story:
 
     def __init__(self, folder: Path) -> None:
         check_output_folder(folder)
-        reporting.make_folder(folder)
+        folder.mkdir(parents=True, exist_ok=True)
         self.folder = folder
         self.names = [name for name in TITLES if estimate.HAS_ESTIMATION or name not in ESTIMATING]
         self.missing = (

@@ -6,7 +6,6 @@ import json
 import shlex
 import sys
 from collections.abc import Iterator
-from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -29,7 +28,6 @@ NEVER = ("side", "working_point", "slow")  # causes that another motion removes
 
 @command("excite", ExciteOptions, reads=("finger",))
 def excite_files(
-    context: typer.Context,
     finger: Annotated[Path, typer.Argument(metavar="FINGER.json|RIG.json", help="finger description, or rig")],
     output: Annotated[Path, output_option("MOTION.csv", "motion, .csv or .parquet")],
     options: ExciteOptions,
@@ -43,7 +41,7 @@ def excite_files(
     """Plan a training motion; report what it excites and which parameters it cannot identify."""
     inputs = simulate.description_files(finger) if simulate.is_rig(finger) else [finger]
     if discriminate is not None:
-        _discriminate(context, finger, discriminate, output, options.rate, inputs)
+        _discriminate(finger, discriminate, output, options, report, inputs)
         return
     console.check_table(output, *inputs)
     console.check_second_file(report, output, "motion and report", *inputs)
@@ -67,19 +65,17 @@ def excite_files(
 
 
 def _discriminate(
-    context: typer.Context, finger: Path, folder: Path, output: Path, rate: float, inputs: list[Path]
+    finger: Path, folder: Path, output: Path, options: ExciteOptions, report: Path | None, inputs: list[Path]
 ) -> None:
     """Write the motion that a diagnosis asked for."""
-    allowed = {"finger", "output", "rate", "discriminate", "progress", "as_json", "quiet"}
-    for parameter in context.command.params:
-        source = context.get_parameter_source(str(parameter.name))
-        if parameter.name not in allowed and source is not None and source.name == "COMMANDLINE":
-            raise InputError(
-                f"{parameter.opts[0]}: given with --discriminate {folder}; expected no other option but --rate"
-            )
+    usual = vars(ExciteOptions(rate=options.rate))
+    given = [name.rstrip("_") for name, value in vars(options).items() if value != usual[name]]
+    for name in [*given, *(["report"] if report else [])]:
+        option = f"--{name.replace('_', '-')}"
+        raise InputError(f"{option}: given with --discriminate {folder}; expected no other option but --rate")
     console.check_table(output, *inputs)
     subject = excite.read_subject(finger)
-    motion = diagnosis.discriminating_motion(folder, subject.finger.data, limits=subject.limits, rate=rate)
+    motion = diagnosis.discriminating_motion(folder, subject.finger.data, limits=subject.limits, rate=options.rate)
     columns = motion.columns()
     console.write_table(output, columns)
     console.print_results((), motion.lines(), left="")
@@ -136,30 +132,13 @@ def _effect_row(cover: EffectCoverage, verdicts: list[Verdict]) -> Row:
         of_key = [v for v in own if v.number.key == key]
         lost = [v for v in of_key if not v.identifiable]
         if lost:
-            missing.append(key if len(lost) == len(of_key) else f"{key} {_which(lost)}")
+            missing.append(key if len(lost) == len(of_key) else f"{key} ({len(lost)} of {len(of_key)})")
     times = cover.times
     return (
         cover.effect.path,
         *(f"{seconds:.1f}" for seconds in (times.positive, times.negative, times.stuck)),
         ", ".join(missing) or "-",
     )
-
-
-def _which(lost: list[Verdict]) -> str:
-    """Name the laws, and the sides of an asymmetric law."""
-    effect = lost[0].number.effect
-    if effect is not None and effect.angles:
-        return "of laws " + _runs(sorted({v.number.point + 1 for v in lost}))
-    return "of " + ", ".join(v.number.path.split(".")[-2] for v in lost)
-
-
-def _runs(numbers: list[int]) -> str:
-    """Shorten 1, 2, 3, 5 to "1-3, 5"."""
-    parts = []
-    for _, group in groupby(enumerate(numbers), lambda pair: pair[1] - pair[0]):
-        run = [number for _, number in group]
-        parts.append(str(run[0]) if len(run) == 1 else f"{run[0]}-{run[-1]}")
-    return ", ".join(parts)
 
 
 def lines(result: ExciteResult) -> Iterator[str]:

@@ -78,7 +78,11 @@ COMMANDS = {
     "score": ("Measure contact detection against labels.", f"{INDEX} {DATA}/index_finger_pushes.parquet -o score.json"),
     "demo": ("Show every step on built-in data.", ""),
 }
-MODULES = {"import": "mjcf", "export": "mjcf"}  # of commands that have none of their own name
+MODULES = {  # of commands that have none of their own name
+    "simulate": "build",
+    **dict.fromkeys(("describe", "import", "export"), "descriptions"),
+    **dict.fromkeys(("tune", "score"), "detection"),
+}
 
 
 @functools.cache

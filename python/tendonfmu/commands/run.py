@@ -138,9 +138,6 @@ def run_files(
     report: Annotated[
         Path | None, typer.Option(metavar="PAGE.html|DIR", help="page of the run; in a folder run.html")
     ] = None,
-    rerun: Annotated[
-        Path | None, typer.Option(metavar="OUT.rrd", help="recording for the viewer Rerun: signals and moving drawing")
-    ] = None,
     progress: Progress = None,
 ) -> None:
     """Of a hand, all fingers run, into one table with columns as index.joint_torque[1]."""
@@ -150,8 +147,6 @@ def run_files(
         reporting.check_page(report, model, recording)
         if report.resolve() == output.resolve():
             raise InputError(f"{report}: the same file for outputs and page; expected two names")
-    if rerun is not None:
-        reporting.check_rerun(rerun, model, recording)
     samples = recorded.read_recording(recording)
     with progress_bar("samples", progress, total=len(samples)) as show:
         result = run(model, samples, **vars(options) | {"progress": show})
@@ -163,7 +158,4 @@ def run_files(
     say(f"{name_of(output)}: {result.summary}")
     if report is not None:
         say(f"{reporting.write_run_page(report, numbers, table, samples.contact)}: the run, to be read in a browser")
-    if rerun is not None:
-        reporting.write_rerun(rerun, result.outputs, samples, fmu.finger_of(model))
-        say(f"{rerun}: the run, for the viewer Rerun")
     print_json(lambda: numbers)

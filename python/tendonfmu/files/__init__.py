@@ -1,8 +1,8 @@
 """How files are read and written: whole or not at all.
 
-`writing` writes whole files and names what temporary ones stand for, `tables` reads and writes tables of numbers (CSV,
-Parquet, pandas, MCAP), `json_node` reads JSON and keeps the path of each value for error messages, and `texts` writes a
-number with its noun and reads templates of HTML.
+`writing` writes whole files, names what temporary ones stand for, writes a number with its noun and reads templates of
+HTML, `tables` reads and writes tables of numbers (CSV, Parquet, pandas, MCAP), and `json_node` reads JSON and keeps the
+path of each value for error messages.
 """
 
 from typing import TYPE_CHECKING
@@ -26,15 +26,20 @@ if TYPE_CHECKING:
         write_blocks,
         write_table,
     )
-    from .texts import are, by_kind, counted, html_template, listed, percent
     from .writing import (
         StandIn,
+        are,
+        by_kind,
         check_output,
         check_output_folder,
-        is_about,
+        counted,
+        html_template,
+        listed,
         path_of,
+        percent,
         whole_file,
         write_bytes,
+        write_files,
         write_text,
     )
 

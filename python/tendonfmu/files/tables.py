@@ -22,8 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError, is_without_memory
-from tendonfmu.files.texts import are, counted
-from tendonfmu.files.writing import path_of, whole_file
+from tendonfmu.files.writing import are, counted, path_of, whole_file
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -1,11 +1,13 @@
-"""How files are written so that they appear whole or not at all, and how temporary files are named in messages."""
+"""How files are written whole or not at all, how temporary files are named, and texts for people."""
 
 from __future__ import annotations
 
 import os
+import re
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from functools import cache
 from pathlib import Path, PosixPath, WindowsPath
 from typing import TYPE_CHECKING
 
@@ -13,6 +15,9 @@ from tendonfmu.errors import InputError, OutputError
 
 if TYPE_CHECKING:
     SystemPath = Path
+    import jinja2
+
+
 else:
     SystemPath = PosixPath if os.name == "posix" else WindowsPath
 
@@ -108,20 +113,31 @@ def whole_file(file: Path) -> Iterator[Path]:
         temporary.chmod(0o666 & ~mask)
         os.replace(temporary, file)
     except OSError as error:
-        if not is_about(error, file.parent):
+        if not _is_about(error, file.parent):
             raise
         raise OutputError(f"{file}: cannot be written ({error.strerror or error})") from None
     finally:
         temporary.unlink(missing_ok=True)
 
 
-def is_about(error: OSError, folder: Path) -> bool:
+def _is_about(error: OSError, folder: Path) -> bool:
     """Return whether an error in writing concerns a folder."""
     if error.errno is None:  # not an error of the operating system
         return False
     if not isinstance(error.filename, str | bytes):
         return True
     return folder.absolute() in Path(os.fsdecode(error.filename)).absolute().parents
+
+
+def write_files(folder: Path, contents: Mapping[str, bytes]) -> None:
+    """Write files to a folder, made if missing: all of them or, where the disk is full, none; the first comes last."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be written ({error.strerror or error})") from None
+    with ExitStack() as written:
+        for name, content in contents.items():
+            written.enter_context(whole_file(folder / name)).write_bytes(content)
 
 
 def write_text(path: Path, text: str) -> None:
@@ -134,3 +150,67 @@ def write_bytes(path: Path, content: bytes) -> Path:
     with whole_file(path) as temporary:
         temporary.write_bytes(content)
     return path
+
+
+# --- texts for people -------------------------------------------------------------------------------------------------
+
+
+def counted(number: int, noun: str, plural: str = "") -> str:
+    """Write a number with its noun."""
+    return f"{number} {noun if number == 1 else plural or f'{noun}s'}"
+
+
+def listed(words: Sequence[str]) -> str:
+    """Join words as in "1, 2 and 3"."""
+    return " and ".join(filter(None, [", ".join(words[:-1]), *words[-1:]]))
+
+
+def are(number: int) -> str:
+    """Return the verb for a number of things: "is" for one, else "are"."""
+    return "is" if number == 1 else "are"
+
+
+def percent(share: float) -> str:
+    """Write a share in percent with two digits, near 100 without decimals."""
+    return f"{100 * share:.2g} %" if share < 0.995 else f"{100 * share:.0f} %"
+
+
+def by_kind(sentences: Iterable[str]) -> list[tuple[str, list[str]]]:
+    """Return one line for each kind of warnings, with all of the kind: those that differ in file, place and numbers."""
+    kinds: dict[str, list[str]] = {}
+    for sentence in dict.fromkeys(sentences):
+        probably = sentence.partition("; probably ")[2]
+        kinds.setdefault(probably or re.sub(r"^\S+: |[-+]?\d[\d.e]*", "", sentence), []).append(sentence)
+    return [(_of_kind(probably, alike), alike) for probably, alike in kinds.items()]
+
+
+def _of_kind(probably: str, alike: Sequence[str]) -> str:
+    """Return the line of several warnings of a kind; the only one itself."""
+    first = alike[0]
+    if len(alike) == 1:
+        return first
+    if not first.endswith(f"; probably {probably}"):
+        return f"{first} (and {len(alike) - 1} more of this kind)"
+    files, columns = ({sentence.split(": ", 2)[k] for sentence in alike} for k in (0, 1))
+    of = f"{counted(len(columns), 'column')} of {counted(len(files), 'file')}"
+    return f"{', '.join(sorted(columns)[:4])}: {of}: probably {probably}"
+
+
+def html_template(name: str) -> jinja2.Template:
+    """Return a template of python/tendonfmu/templates. It escapes all texts, and refuses a variable it is not given."""
+    return _environment().get_template(name)
+
+
+@cache
+def _environment() -> jinja2.Environment:
+    import jinja2
+
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("tendonfmu"),
+        undefined=jinja2.StrictUndefined,
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["by_kind"] = by_kind
+    return environment

@@ -26,8 +26,17 @@ if TYPE_CHECKING:
         package_file,
         write_c_array,
     )
-    from .reference_results import bridged_rows, reference_run, related_members
-    from .running import check_model, columns_of, finger_of, outputs_of, run_model, summary
+    from .running import (
+        bridged_rows,
+        check_model,
+        columns_of,
+        finger_of,
+        outputs_of,
+        reference_run,
+        related_members,
+        run_model,
+        summary,
+    )
     from .ssp import (
         OMS,
         SPACES,

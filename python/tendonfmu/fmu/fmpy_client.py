@@ -50,13 +50,12 @@ def run_fmu(
     recording: Recording,
     *,
     kinematics_source: int = 1,
-    parameters: Mapping[str, float] | None = None,
     progress: Progress | None = None,
 ) -> dict[str, NDArray[Any]]:
     """Run a friction FMU over a recording."""
     # returns [N]
     with _unpacked(path) as folder:
-        run = _Run(path, folder, parameters or {})
+        run = _Run(path, folder)
         recording.require(run.joints, run.tendons, run.inputs(kinematics_source))
         return run.over(recording, kinematics_source, progress)
 
@@ -196,11 +195,10 @@ class _Slave2(_Slave):
         self._callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
         self._slave.instantiate(callbacks=self._callbacks, loggingOn=True)
 
-    def initialise(self, start: float, whole: Mapping[int, int], real: Mapping[int, float]) -> None:
-        """Write settings by value reference, and enter the initialisation mode."""
+    def initialise(self, start: float, reference: int, value: int) -> None:
+        """Write a whole number by its value reference, and enter the initialisation mode."""
         self._slave.setupExperiment(startTime=start)
-        self._slave.setInteger(list(whole), list(whole.values()))
-        self._slave.setReal(list(real), list(real.values()))
+        self._slave.setInteger([reference], [value])
         self._slave.enterInitializationMode()
 
     def writer(self, references: list[int], count: int) -> Callable[[Pointer], None]:
@@ -232,9 +230,8 @@ class _Slave3(_Slave):
         flags = [ctypes.c_bool() for _ in range(3)]
         self._answers = (*map(ctypes.byref, flags), ctypes.byref(ctypes.c_double()))
 
-    def initialise(self, start: float, whole: Mapping[int, int], real: Mapping[int, float]) -> None:
-        self._slave.setInt32(list(whole), list(whole.values()))
-        self._slave.setFloat64(list(real), list(real.values()))
+    def initialise(self, start: float, reference: int, value: int) -> None:
+        self._slave.setInt32([reference], [value])
         self._slave.enterInitializationMode(startTime=start)
 
     def writer(self, references: list[int], count: int) -> Callable[[Pointer], None]:
@@ -253,10 +250,9 @@ class _Slave3(_Slave):
 class _Run:
     """One instance of an FMU. Its arrays are laid out once, so that a step is a few calls."""
 
-    def __init__(self, path: Path, folder: Path, parameters: Mapping[str, float]) -> None:
+    def __init__(self, path: Path, folder: Path) -> None:
         self.path = path
         self._at = str(path)  # place in error messages: the FMU, later the recording's row
-        self._parameters = parameters
         self._messages: list[str] = []
         description = _description_of(path, folder)
         self._at_end = _samples_at_end(folder)
@@ -340,11 +336,7 @@ class _Run:
             raise InputError(
                 f"{self.path}: no parameter kinematics_source; expected a friction FMU of `tendonfmu build`"
             )
-        for path in self._parameters:
-            if path not in self._all:
-                raise InputError(f"{self.path}: no parameter {path!r}; expected one of this FMU")
-        real = {self._all[path].valueReference: value for path, value in self._parameters.items()}
-        self._slave.initialise(start, {self._all["kinematics_source"].valueReference: source}, real)
+        self._slave.initialise(start, self._all["kinematics_source"].valueReference, source)
 
     def over(self, recording: Recording, source: int, progress: Progress | None) -> dict[str, NDArray[Any]]:
         with self._refusals():

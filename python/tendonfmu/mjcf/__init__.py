@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from .finger_import import ImportSettings, import_finger
+    from .finger_import import import_finger
     from .number_export import export_numbers
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

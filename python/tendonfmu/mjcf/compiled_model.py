@@ -127,7 +127,6 @@ class Joint:
     damping: float  # (N·m·s/rad; N·m; kg·m²)
     frictionloss: float
     armature: float
-    is_nonlinear: bool  # whether its spring or damper has terms of higher order
 
 
 @dataclass(frozen=True)
@@ -137,11 +136,8 @@ class Tendon:
     name: str  # name
     index: int  # in the model, from 0
     is_spatial: bool  # whether it runs through sites and around geoms
-    stiffness: float  # (N/m; N·s/m; N; kg)
-    damping: float
-    frictionloss: float
-    armature: float
-    is_limited: bool  # whether its length has limits
+    stiffness: float  # (N/m)
+    frictionloss: float  # (N)
 
 
 @dataclass(frozen=True)
@@ -190,7 +186,6 @@ class CompiledModel:
     def _joint(self, k: int) -> Joint:
         m = self._model
         dof, place = int(m.jnt_dofadr[k]), int(m.jnt_qposadr[k])
-        spring, damper = _higher_order(m, "jnt_stiffnesspoly", k), _higher_order(m, "dof_dampingpoly", dof)
         return Joint(
             name=m.joint(k).name,
             kind=KINDS[int(m.jnt_type[k])],
@@ -204,7 +199,6 @@ class CompiledModel:
             damping=float(m.dof_damping[dof]),
             frictionloss=float(m.dof_frictionloss[dof]),
             armature=float(m.dof_armature[dof]),
-            is_nonlinear=spring or damper,
         )
 
     def _tendon(self, k: int) -> Tendon:
@@ -215,10 +209,7 @@ class CompiledModel:
             index=k,
             is_spatial=spatial,
             stiffness=float(m.tendon_stiffness[k]),
-            damping=float(m.tendon_damping[k]),
             frictionloss=float(m.tendon_frictionloss[k]),
-            armature=float(m.tendon_armature[k]) if hasattr(m, "tendon_armature") else 0.0,
-            is_limited=bool(m.tendon_limited[k]),
         )
 
     def _actuator(self, k: int) -> Actuator:
@@ -353,9 +344,3 @@ class CompiledModel:
             if k >= 0:
                 return (k if bodies is None else int(bodies[k])), np.array(places[k])
         raise InputError(f"{self.path}: {name}: no site, geom or body of this name in the model")
-
-
-def _higher_order(model: Any, name: str, index: int) -> bool:
-    """Return whether a row of polynomial coefficients, which older versions lack, has any."""
-    rows = getattr(model, name, None)
-    return rows is not None and bool(np.any(rows[index]))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -32,30 +32,17 @@ from tendonfmu.mjcf.finger_parts import (
     stiffness_of,
 )
 from tendonfmu.model import native
+from tendonfmu.options import ImportOptions
 
 FORMAT = "tendonfmu-finger-1"
 UNLIMITED = 1.0  # rad (m); range on both sides of the reference of a joint without limits
 STRIBECK = 0.1  # rad/s; without effect as long as static equals coulomb
 LONGEST_ARM = 0.3  # m; larger coefficients of fixed tendons are no lengths, such as 1 where joints are coupled
 MISSED = 0.02  # share of the largest holding torque that `gravity` rows may miss without a warning
-OF_EVERY_MODEL = "shapes and contacts, the actuators' dynamics, sensors, keyframes: no part of a description"
-
-
-@dataclass(frozen=True)
-class ImportSettings:
-    """What is taken from a model."""
-
-    joints: Sequence[str] = ()  # names of joints, base first; without any the one chain that driven tendons move
-    tendons: Sequence[str] | None = None  # names of tendons; None takes all that are driven and move a joint
-    # ranges of joints by name (rad), in place of the model's limits
-    ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    bidirectional: Sequence[str] = ()  # names of tendons that are cable loops
-    tip: str | None = None  # site, geom or body that is the fingertip; None leaves `links` out
-    gravity: bool = False  # whether to write the links' weight as rows `gravity`
-    stiffness: float | None = None  # of tendons whose stiffness the model does not have (N/m); None takes them as rigid
-    tolerance: float = 0.02  # share up to which a moment arm counts as constant
-    threshold: float = 0.03  # `contact.threshold` of all joints (N·m)
-    name: str | None = None  # of the finger; None takes the model's
+OF_EVERY_MODEL = (
+    "limits, terms of higher order, damping and armature of tendons, springs beside their drives, shapes and contacts, "
+    "the actuators' dynamics, sensors, keyframes: no part of a description"
+)
 
 
 @dataclass(frozen=True)
@@ -81,17 +68,17 @@ class ImportedFinger:
         }
 
 
-def import_finger(path: Path, settings: ImportSettings) -> ImportedFinger:
+def import_finger(path: Path, settings: ImportOptions) -> ImportedFinger:
     """Make a finger description from a MuJoCo model."""
     model = CompiledModel(path)
-    joints = _chain(model, settings.joints)
-    ranges, notes = joint_ranges(model, joints, settings.ranges)
+    joints = _chain(model, _names(settings.joints))
+    ranges, notes = joint_ranges(model, joints, dict(map(_range, settings.range_)))
     angles = sampled_angles(ranges)
-    tendons = choose_tendons(model, joints, angles, settings.tendons)
-    for name in settings.bidirectional:
+    tendons = choose_tendons(model, joints, angles, _names(settings.tendons) or None)
+    for name in _names(settings.bidirectional):
         if model.tendon_named(name) not in tendons:
             raise InputError(f"{path}: --bidirectional {name}: no such tendon; expected one of the finger's")
-    arms = moment_arms(model, joints, tendons, angles, settings.tolerance)
+    arms = moment_arms(model, joints, tendons, angles, settings.arm_tolerance)
     _check_moved(model, joints, arms)
     links = None if settings.tip is None else _links(model, joints, settings.tip)
     weight, warnings = _weight(model, joints, angles, links) if settings.gravity else ([], [])
@@ -111,9 +98,26 @@ def import_finger(path: Path, settings: ImportSettings) -> ImportedFinger:
     return ImportedFinger(
         data=data,
         notes=[*notes, *_sources(model, joints, tendons, settings)],
-        warnings=[*_arm_warnings(joints, tendons, arms, ranges, settings.tolerance), *warnings],
+        warnings=[*_arm_warnings(joints, tendons, arms, ranges, settings.arm_tolerance), *warnings],
         left_out=left_out(model, joints, tendons, angles, settings.gravity, links is not None),
     )
+
+
+def _names(texts: Sequence[str]) -> list[str]:
+    """Return the names of an option that may be repeated and may hold several names."""
+    return [name.strip() for text in texts for name in text.split(",") if name.strip()]
+
+
+def _range(text: str) -> tuple[str, tuple[float, float]]:
+    joint, _, limits = text.rpartition("=")
+    low, _, high = limits.partition(":")
+    try:
+        span = float(low), float(high)
+    except ValueError:
+        raise InputError(f"--range {text}: expected JOINT=LOW:HIGH in rad, such as mcp=-0.3:1.4") from None
+    if not joint or not -1e6 < span[0] < span[1] < 1e6:
+        raise InputError(f"--range {text}: expected JOINT=LOW:HIGH with LOW below HIGH, in rad")
+    return joint, span
 
 
 # --- joints -----------------------------------------------------------------------------------------------------------
@@ -217,12 +221,10 @@ def _check_moved(model: CompiledModel, joints: Sequence[Joint], arms: Sequence[S
             raise InputError(f"{model.path}: joint {joint.name}: moved by none of the tendons; expected {expected}")
 
 
-def _tendon(
-    model: CompiledModel, tendon: Tendon, arms: Sequence[MomentArm], settings: ImportSettings
-) -> dict[str, Any]:
+def _tendon(model: CompiledModel, tendon: Tendon, arms: Sequence[MomentArm], settings: ImportOptions) -> dict[str, Any]:
     stiffness, _ = stiffness_of(model, tendon, settings.stiffness)
     row = {"name": tendon.name, "stiffness": stiffness, "moment_arms": [arm.arm for arm in arms]}
-    return row | ({"bidirectional": True} if tendon.name in settings.bidirectional else {})
+    return row | ({"bidirectional": True} if tendon.name in _names(settings.bidirectional) else {})
 
 
 def _tendon_rows(
@@ -270,7 +272,7 @@ def _arm_warnings(
 
 
 def _sources(
-    model: CompiledModel, joints: Sequence[Joint], tendons: Sequence[Tendon], settings: ImportSettings
+    model: CompiledModel, joints: Sequence[Joint], tendons: Sequence[Tendon], settings: ImportOptions
 ) -> Iterator[str]:
     sources: dict[str, list[str]] = {}
     for tendon in tendons:
@@ -342,9 +344,6 @@ def left_out(
 
 
 def _of_joints(model: CompiledModel, joints: Sequence[Joint], angles: Numbers) -> Iterator[str]:
-    yield from _named("joint", [joint.name for joint in joints if joint.limits], "limits")
-    nonlinear = [joint.name for joint in joints if joint.is_nonlinear]
-    yield from _named("joint", nonlinear, "stiffness or damping of higher order")
     model.place(joints, (angles.min(axis=0) + angles.max(axis=0)) / 2)
     matrix = model.inertia(joints)
     bare = [j for j, joint in enumerate(joints) if not joint.armature]
@@ -361,17 +360,8 @@ def _of_tendons(
 ) -> Iterator[str]:
     moves = moved_velocities(model, joints, angles)
     velocities = [joint.velocity for joint in joints]
-    yield from _named("tendon", [tendon.name for tendon in tendons if tendon.is_limited], "limits of the length")
     for tendon in tendons:
-        if tendon.damping:
-            yield f"tendon {tendon.name}: damping {tendon.damping:g} N·s/m: no viscous friction without a tendon force"
-        if tendon.armature:
-            yield f"tendon {tendon.name}: armature {tendon.armature:g} kg"
-        if tendon.stiffness and any(actuator.tendon == tendon.index for actuator in model.actuators):
-            yield f"tendon {tendon.name}: spring of {tendon.stiffness:g} N/m beside its actuator"
         motors = motors_of(model, tendon)
-        if tendon.frictionloss and motors:
-            yield f"tendon {tendon.name}: frictionloss {tendon.frictionloss:g} N of the spring between motor and finger"
         for joint in model.joints:
             if joint.velocity not in velocities and moves[tendon.index, joint.velocity] and joint not in motors:
                 yield f"tendon {tendon.name}: also moves joint {joint.name}, which is not in --joints"
@@ -398,8 +388,3 @@ def _weight_left_out(model: CompiledModel, joints: Sequence[Joint], angles: Numb
     if largest.max() > WEIGHTLESS:
         sizes = ", ".join(f"{joint.name} {1e3 * size:.3g}" for joint, size in zip(joints, largest, strict=True))
         yield f"weight of the links, at most (mN·m): {sizes}; --gravity takes it"
-
-
-def _named(kind: str, names: Sequence[str], what: str) -> Iterator[str]:
-    if names:
-        yield f"{kind} {', '.join(names)}: {what}"

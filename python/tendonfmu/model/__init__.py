@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     )
     from .description_numbers import (
         DEFAULTS,
-        DETECTING,
         EFFECT_NUMBERS,
         LAW_NUMBERS,
         LEFT_OUT,
@@ -75,8 +74,6 @@ if TYPE_CHECKING:
     from .routing_geometry import (
         EDGE_RED,
         TENDON_COLOURS,
-        BentDrawing,
-        DrawnTendon,
         FingerDrawing,
         Mark,
         finger_drawing,

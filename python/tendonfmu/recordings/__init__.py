@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from .columns import GROUPS, Nis, RecordingEntry, RoutingEntry, Whiteness, element_of, right_spelling
-    from .converters import convert_file
+    from .columns import GROUPS, Nis, RecordingEntry, RoutingEntry, Whiteness
     from .converters.column_map import read_log_format
     from .converters.inspection import Inspection, inspect_log
     from .converters.lerobot_log import LeRobotLog
+    from .converters.machines import convert_file
     from .converters.one_joint import describe_joint, describe_recorded_joint, joint_description
     from .converters.proposal import (
         Proposal,
@@ -54,7 +54,7 @@ if TYPE_CHECKING:
         read_recording,
         read_recordings,
     )
-    from .residuals import Model, consistency, delayed_torque, rms, run_parts, whiteness
+    from .residuals import Model, consistency, delayed_torque, rms, run_parts, whiteness, with_linear_springs
     from .routing import (
         Learned,
         TendonRouting,
@@ -65,7 +65,6 @@ if TYPE_CHECKING:
         routed,
         smooth_speeds,
     )
-    from .signal_noise import FEWEST, BestAngles, best_angles, joint_position_noise, stopped, with_angles, zero_phase
-    from .tendon_springs import with_linear_springs
+    from .signal_noise import FEWEST, best_angles, joint_position_noise, stopped, zero_phase
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -15,7 +15,7 @@ from tendonfmu.arrays import Numbers
 from tendonfmu.files import are, counted, percent
 from tendonfmu.model import Finger
 from tendonfmu.recordings.recording import GROUPS, Recording
-from tendonfmu.recordings.tendon_springs import with_linear_springs
+from tendonfmu.recordings.residuals import with_linear_springs
 
 Runs = list[tuple[int, int]]  # (begin, end) of samples, end excluded
 

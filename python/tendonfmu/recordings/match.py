@@ -49,9 +49,9 @@ from tendonfmu.recordings.kinematics import (
 )
 from tendonfmu.recordings.prepared import MANY_RESTS, left_at_rest
 from tendonfmu.recordings.recording import GROUP_PER, Recording, check_numbers
+from tendonfmu.recordings.residuals import with_linear_springs
 from tendonfmu.recordings.routing import TendonRouting, clock_drift, learn_routing, routed
 from tendonfmu.recordings.signal_noise import white_noise
-from tendonfmu.recordings.tendon_springs import with_linear_springs
 from tendonfmu.recordings.traps import find_traps
 
 UNFIT, POOR = 0.15, 0.03  # share of variance that the equations leave: above these an error, a warning

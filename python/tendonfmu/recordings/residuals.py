@@ -7,14 +7,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import chdtrc, gammaincinv
 
 from tendonfmu.arrays import Data, Flags, Numbers
-from tendonfmu.model import Finger, moment_arms
+from tendonfmu.model import Finger, extension_rows, moment_arms, native, without_detection
 from tendonfmu.recordings.columns import Nis, Whiteness
+from tendonfmu.recordings.recording import Recording
 
 LAGS = 20  # of the Ljung-Box test
 CONFIDENCE = 0.95
@@ -111,3 +112,33 @@ def whiteness(standardised: Sequence[Numbers]) -> Whiteness:
 
 def _lagged(series: Sequence[Numbers], lag: int) -> float:
     return sum(float(np.nansum(part[lag:] * part[:-lag])) for part in series if len(part) > lag)
+
+
+# --- what springs and drives bend -------------------------------------------------------------------------------------
+
+BENDING = ("backlash", "tendon_nonlinearity")
+
+
+def with_linear_springs(finger: Finger, recording: Recording) -> Recording:
+    """Return what tendons without play, on linear springs of the described stiffness, would have recorded.
+
+    x0 = zero + R q + f0/k holds for it where the described `backlash` and `tendon_nonlinearity` are right.
+    """
+    rows = [row for row in extension_rows(finger.data) if row["effect"] in BENDING and row.get("tendon")]
+    if not rows:
+        return recording
+    position, force = recording.groups["tendon_position"].copy(), recording.groups["tendon_force"]
+    for i in sorted({row["tendon"] - 1 for row in rows}):
+        own, stiffness = [i], finger.data["tendons"][i]["stiffness"]
+        # by the core's own law: a joint that this tendon alone turns, with an arm of 1 m, is at x0 less the stretch
+        alone = {
+            "format": finger.data["format"],
+            "name": "spring",
+            "joints": [{}],
+            "tendons": [{"stiffness": stiffness, "moment_arms": [1.0], "bidirectional": True}],
+            "extensions": [{**row, "tendon": 1} for row in rows if row["tendon"] == i + 1],
+        }
+        given = {"time": recording.time, "tendon_force": force[:, own], "tendon_position": position[:, own]}
+        outputs = native.run_recording(without_detection(alone), given)
+        position[:, i] = outputs["joint_angle"][:, 0] + force[:, i] / stiffness
+    return replace(recording, groups={**recording.groups, "tendon_position": np.asarray(position)})

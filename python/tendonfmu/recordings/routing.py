@@ -24,8 +24,8 @@ from tendonfmu.errors import InputError
 from tendonfmu.model import Finger
 from tendonfmu.recordings.faults import gaps, still_runs
 from tendonfmu.recordings.recording import Recording
+from tendonfmu.recordings.residuals import with_linear_springs
 from tendonfmu.recordings.signal_noise import FEWEST, stopped, white_noise, zero_phase
-from tendonfmu.recordings.tendon_springs import with_linear_springs
 from tendonfmu.statistics import Estimate, noisy_regression
 
 BLOCK = 2.0  # s; longer than residuals of sensors are correlated

@@ -31,8 +31,7 @@ from tendonfmu.detect import (
 )
 from tendonfmu.files import counted
 from tendonfmu.recordings import flagged_stretches
-from tendonfmu.report.numbers import Table
-from tendonfmu.report.page import write_figures
+from tendonfmu.report.kit import Table, write_figures
 
 PAGE, TUNING_PAGE = "score.html", "tuning.html"
 SHOWN = 20.0  # s of the recording, where most events are

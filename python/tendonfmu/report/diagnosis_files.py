@@ -5,11 +5,7 @@ The report is "tendonfmu-diagnosis-1" of docs/reference/commands/diagnose.md.
 
 from __future__ import annotations
 
-import os
-import shutil
-import tempfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any, cast
@@ -17,16 +13,10 @@ from typing import Any, cast
 import numpy as np
 
 from tendonfmu import diagnosis as found
-from tendonfmu.errors import OutputError, own_fault
-from tendonfmu.files import (
-    check_output_folder,
-    finite,
-    is_about,
-    report_text,
-    write_text,
-)
-from tendonfmu.fmu import build_fmu
-from tendonfmu.model import description_text
+from tendonfmu.errors import own_fault
+from tendonfmu.files import check_output_folder, finite, report_text, write_files
+from tendonfmu.fmu import members, pack
+from tendonfmu.model import description_text, finger_from_text
 from tendonfmu.report.diagnosis_page import PAGE, diagnosis_page
 from tendonfmu.report.diagnosis_text import names_of
 from tendonfmu.report.diagnosis_types import DiagnosisReport
@@ -46,78 +36,26 @@ def check_folder(folder: Path, inputs: Sequence[Path]) -> None:
 
 def write_diagnosis(diagnosis: found.Diagnosis, folder: Path) -> dict[Path, str]:
     """Write the report, both descriptions, the FMU and the page."""
-    beside = folder.absolute().parent
-    try:
-        beside.mkdir(parents=True, exist_ok=True)
-        with _folder_beside(folder) as made_in:
-            (made_in / "new").mkdir()
-            with own_fault("the files of the diagnosis"):
-                made = _make_for(diagnosis, made_in / "new", folder)
-            with uninterrupted():
-                _move(made, folder, made_in / "old")
-    except OSError as error:
-        if not is_about(error, beside):
-            raise
-        raise OutputError(f"{folder}: cannot be written ({error.strerror or error})") from None
-    return {folder / file.name: what for file, what in made.items()}
-
-
-def _make_for(diagnosis: found.Diagnosis, folder: Path, named: Path) -> dict[Path, str]:
-    """Make the files in a folder. A refusal names the folder that the user gave."""
-    try:
-        return _make(diagnosis, folder)
-    except OutputError as refused:
-        raise OutputError(str(refused).replace(str(folder), str(named))) from None
-
-
-@contextmanager
-def _folder_beside(folder: Path) -> Iterator[Path]:
-    """Make a temporary folder on the same disk. Its removal is not interrupted."""
-    name = tempfile.mkdtemp(dir=folder.absolute().parent, prefix=f".{folder.absolute().name}-")
-    try:
-        yield Path(name)
-    finally:
-        with uninterrupted():
-            shutil.rmtree(name, ignore_errors=True)
-
-
-def _move(files: Iterable[Path], folder: Path, old: Path) -> None:
-    """Move files into a folder, the report last, and move those of an earlier diagnosis to `old`; undo all on error."""
-    is_new = not folder.exists()
-    folder.mkdir(exist_ok=True)
-    old.mkdir()
-    moved: list[tuple[Path, Path]] = []
-    ordered = sorted(files, key=lambda file: file.name == REPORT)
-    leaving = [(folder / file.name, old / file.name) for file in ordered if (folder / file.name).is_file()]
-    try:
-        for source, target in (*leaving, *((file, folder / file.name) for file in ordered)):
-            os.replace(source, target)
-            moved.append((source, target))
-    except BaseException:
-        for source, target in reversed(moved):
-            os.replace(target, source)
-        if is_new:
-            folder.rmdir()
-        raise
-
-
-def _make(diagnosis: found.Diagnosis, folder: Path) -> dict[Path, str]:
-    """Write all files to an empty folder."""
-    write_text(folder / PAGE, diagnosis_page(diagnosis))
+    with own_fault("the files of the diagnosis"):
+        page = diagnosis_page(diagnosis).encode()
+        nominal, extended = (
+            description_text(dict(data)).encode() for data in (diagnosis.nominal_data, diagnosis.extended_data)
+        )
+        fmu = pack(members(finger_from_text(Path(EXTENDED), extended)))
     causes = len(diagnosis.causes)
     added = "no cause added" if causes == 0 else "its cause added" if causes == 1 else f"its {causes} causes added"
-    for name, data in ((NOMINAL, diagnosis.nominal_data), (EXTENDED, diagnosis.extended_data)):
-        write_text(folder / name, description_text(dict(data)))
-    build_fmu(folder / EXTENDED, folder / EXTENDED_FMU)
-    files = {
-        folder / PAGE: "all results, to be read in a browser",
-        folder / REPORT: "the same numbers",
-        folder / EXTENDED: f"the finger with {added}, fitted",
-        folder / EXTENDED_FMU: "the same as an FMU",
-        folder / NOMINAL: "the given model, fitted",
+    what = {
+        PAGE: "all results, to be read in a browser",
+        REPORT: "the same numbers",
+        EXTENDED: f"the finger with {added}, fitted",
+        EXTENDED_FMU: "the same as an FMU",
+        NOMINAL: "the given model, fitted",
     }
-    write_text(folder / REPORT, report_text(build_report(diagnosis, [file.name for file in files])))
-    return files
+    report = report_text(build_report(diagnosis, list(what))).encode()
+    contents = {REPORT: report, PAGE: page, EXTENDED: extended, EXTENDED_FMU: fmu, NOMINAL: nominal}
+    with uninterrupted():
+        write_files(folder, contents)
+    return {folder / name: words for name, words in what.items()}
 
 
 # --- the report -------------------------------------------------------------------------------------------------------

@@ -21,19 +21,20 @@ from tendonfmu.files import counted
 from tendonfmu.report import diagnosis_text as texts
 from tendonfmu.report.diagnosis_figures import diagnosis_sheets
 from tendonfmu.report.diagnosis_words import words_of
-from tendonfmu.report.marked_finger import finger_figure
-from tendonfmu.report.numbers import (
+from tendonfmu.report.finger_figures import finger_figure
+from tendonfmu.report.kit import (
     Row,
+    Tile,
     capital,
     decimals,
     magnitude,
     percent,
     percent_interval,
     probability,
+    render,
     rounded,
     together,
 )
-from tendonfmu.report.page import Tile, render
 
 PAGE = "diagnosis.html"
 _MOST = 4  # pairs listed at most

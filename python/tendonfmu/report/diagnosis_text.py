@@ -29,7 +29,7 @@ from tendonfmu.diagnosis import (
 )
 from tendonfmu.files import counted
 from tendonfmu.report.diagnosis_words import words_of
-from tendonfmu.report.numbers import (
+from tendonfmu.report.kit import (
     Row,
     Table,
     capital,

@@ -7,7 +7,7 @@ friction laws have a sheet for the joints, and one for each tendon.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from tendonfmu.estimate import FitPicture, FitSeries, LawBands, LawCurve, asymme
 from tendonfmu.files import are, counted
 from tendonfmu.model import Effect, effects, sliding_velocity, velocity_threshold
 from tendonfmu.recordings import flagged_stretches
-from tendonfmu.report.numbers import rms, torque_unit
+from tendonfmu.report.kit import rms, torque_unit
 
 SHOWN = 10.0  # s of motion, starting at BEGIN as in the paper's figs. 6 and 7 if the recording is long enough
 BEGIN = 60.0
@@ -426,30 +426,3 @@ def _unit(effect: Effect, curves: Sequence[LawCurve]) -> tuple[float, str]:
     largest = _top(curves)
     factor, unit = next((pair for pair in ((1.0, "N·m"), (1e3, "mN·m")) if pair[0] * largest >= 0.5), (1e6, "µN·m"))
     return factor, f"friction ({unit})" if effect.kind == "friction" else f"load friction ({unit}/N)"
-
-
-# --- correlation ------------------------------------------------------------------------------------------------------
-
-
-class Pair(NamedTuple):
-    """Two unknowns and the correlation of their errors."""
-
-    first: str
-    second: str
-    correlation: float
-
-
-def correlation(covariance: Numbers) -> Numbers:
-    """Return the correlations [p, p] of a covariance; 0 where the variance is 0."""
-    size = np.sqrt(np.diag(covariance))
-    scale = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0)
-    return np.asarray(np.clip(covariance * scale[:, None] * scale[None, :], -1.0, 1.0))
-
-
-def strongest_pairs(picture: FitPicture, count: int) -> list[Pair]:
-    """Return the pairs of unknowns whose errors are most strongly correlated, strongest first."""
-    values = correlation(picture.covariance)
-    rows, columns = np.triu_indices(len(values), 1)
-    best = np.argsort(-np.abs(values[rows, columns]), kind="stable")[:count]
-    names = [unknown.name for unknown in picture.unknowns]
-    return [Pair(names[a], names[b], float(values[a, b])) for a, b in zip(rows[best], columns[best], strict=True)]

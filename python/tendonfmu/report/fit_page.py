@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,22 +21,20 @@ from tendonfmu.estimate import (
     known_numbers,
     verdicts,
 )
-from tendonfmu.files import are, counted, write_text
+from tendonfmu.files import are, counted, write_files
 from tendonfmu.model import Finger, effects, part_of
 from tendonfmu.recordings import RecordingEntry
-from tendonfmu.report.fit_figures import fit_sheets, strongest_pairs
-from tendonfmu.report.numbers import Row, Table, column, percent, rounded, together, torque_unit, unit_text
-from tendonfmu.report.page import Tile, make_folder, render
+from tendonfmu.report.fit_figures import fit_sheets
+from tendonfmu.report.kit import Row, Table, Tile, column, percent, render, rounded, together, torque_unit, unit_text
 
 PAGE = "report.html"
-PAIRS = 20  # most strongly correlated pairs in the table
+TILES = 4  # sets of data whose error has a tile
 EXAMPLES = 3  # paths listed for each reason
 _METHODS = {
     "batch": "Maximum likelihood over all samples at once (batch)",
     "ekf": "The extended Kalman filter of the paper (ekf), sample by sample",
 }
 _LIMIT = f"{100 * identifiability.LIMIT:.0f}\u00a0%"
-_COMPARED = "Not trained on: "
 
 
 # --- residuals --------------------------------------------------------------------------------------------------------
@@ -87,7 +85,7 @@ def residual_tables(report: FitReport, joints: Sequence[str]) -> list[ResidualTa
     residual = report["residual"]
     sets: list[tuple[str, ResidualRms | Comparison | None]]
     sets = [("Training", residual["train"]), ("Held out of training", residual["held_out"])]
-    sets += [(f"{_COMPARED}{run['label']}", run) for run in residual["comparisons"]]
+    sets += [(f"Not trained on: {run['label']}", run) for run in residual["comparisons"]]
     known = [(title, data) for title, data in sets if data and "rms" in data]
     factor, unit = torque_unit(max((max(column(data["torque_rms"])) for _, data in known), default=0.0))
     listed = []
@@ -102,14 +100,6 @@ def residual_tables(report: FitReport, joints: Sequence[str]) -> list[ResidualTa
         ]
         listed.append(ResidualTable(title, unit, rows if len(joints) > 1 else rows[:1], rows[-1]))
     return listed
-
-
-def page_tables(tables: list[ResidualTable], joints: Sequence[str]) -> list[ResidualTable]:
-    """List the residuals as the page shows them: those of a finger with one joint are joined, a row per set of data."""
-    if len(joints) > 1 or not tables:
-        return tables
-    rows = [replace(table.all, name=table.title) for table in tables]
-    return [ResidualTable(joints[0], tables[0].unit, rows, rows[0])]
 
 
 # --- sentences of the page --------------------------------------------------------------------------------------------
@@ -196,8 +186,7 @@ def _thousands(number: int) -> str:
 
 
 def _how_well(tables: Sequence[ResidualTable]) -> Iterator[str]:
-    few, many = apart(tables)
-    for table in few:
+    for table in tables:
         row = table.all
         if row.left is None:
             continue
@@ -212,22 +201,6 @@ def _how_well(tables: Sequence[ResidualTable]) -> Iterator[str]:
                 f"bias, {percent(model)}"
             )
         yield text + "."
-    if many:
-        yield f"{counted(len(many), 'recording')} not trained on: {range_of(many)} of the torque are left."
-
-
-def apart(tables: Sequence[ResidualTable]) -> tuple[list[ResidualTable], list[ResidualTable]]:
-    """Split tables into those described one by one and comparisons that are too many for that."""
-    compared = [table for table in tables if table.title.startswith(_COMPARED)]
-    if len(compared) <= 2:
-        return list(tables), []
-    return [table for table in tables if table not in compared], compared
-
-
-def range_of(tables: Sequence[ResidualTable]) -> str:
-    """Return the least and the largest share of the torque that is left."""
-    shares = [table.all.left for table in tables if table.all.left is not None]
-    return f"{percent(min(shares))} to {percent(max(shares))}" if shares else "an unknown share"
 
 
 def consistency(picture: FitPicture) -> Iterator[str]:
@@ -341,8 +314,7 @@ def lines(fit: FrictionFit) -> Iterator[str]:
 
 def write_fit_page(picture: FitPicture, folder: Path) -> dict[Path, str]:
     """Write `report.html` to a folder, which is made if missing, whole or not at all."""
-    make_folder(folder)
-    write_text(folder / PAGE, fit_page(picture))
+    write_files(folder, {PAGE: fit_page(picture).encode()})
     return {folder / PAGE: "all results, to be read in a browser"}
 
 
@@ -359,16 +331,11 @@ def fit_page(picture: FitPicture) -> str:
         sentences=list(summary_sentences(picture, tables)),
         joint_names=joints,
         residuals=[
-            (f"{each.title}: rms in {each.unit}", [(row.name, *row.texts) for row in each.rows])
-            for each in page_tables(tables, joints)
+            (f"{each.title}: rms in {each.unit}", [(row.name, *row.texts) for row in each.rows]) for each in tables
         ],
         residual_headings=RESIDUAL_HEADINGS,
         consistency=list(consistency(picture)),
         doubts=list(_doubts(report)),
-        pairs=[
-            (f"{pair.correlation:+.3f}".replace("-", "−"), pair.first, pair.second)
-            for pair in strongest_pairs(picture, PAIRS)
-        ],
         recordings=[_recording(recording) for recording in report["recordings"]],
         options={name: _option(value) for name, value in report["options"].items()},
         groups=list(_groups(picture)),
@@ -376,14 +343,11 @@ def fit_page(picture: FitPicture) -> str:
 
 
 def _tiles(report: FitReport, tables: Sequence[ResidualTable]) -> list[Tile]:
-    few, many = apart(tables)
     tiles = [
         Tile(percent(table.all.left), "", f"of the torque is left: {table.title[0].lower() + table.title[1:]}")
-        for table in few
+        for table in tables[:TILES]
         if table.all.left is not None
     ]
-    if many:
-        tiles.append(Tile(range_of(many), "", f"of the torque is left in {len(many)} recordings not trained on"))
     bias = tables[0].all.share(tables[0].all.bias_only) if tables else None
     if bias is not None:
         tiles.append(Tile(percent(bias), "", "would be left by the bias alone"))

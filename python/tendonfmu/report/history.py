@@ -13,8 +13,7 @@ import numpy as np
 from tendonfmu.diagnosis import NBSP, History, Line, Names, at_place, quantity, share_of
 from tendonfmu.drawing import BLUE, GREY, VERMILION, Panel, Sheet, bars, curve, dots, panel
 from tendonfmu.files import counted, whole_file, write_text
-from tendonfmu.report.numbers import Row, capital, percent, unit_text, with_ends
-from tendonfmu.report.page import render
+from tendonfmu.report.kit import Row, capital, percent, render, unit_text, with_ends
 
 FORMAT = "tendonfmu-history-1"
 TABLE, PAGE = "history.csv", "history.html"

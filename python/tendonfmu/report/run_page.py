@@ -13,8 +13,7 @@ from tendonfmu import drawing as draw
 from tendonfmu.files import check_output, check_output_folder, counted, write_text
 from tendonfmu.model import Finger
 from tendonfmu.recordings import flagged_stretches
-from tendonfmu.report.numbers import Row, rms, torque_unit
-from tendonfmu.report.page import Tile, render
+from tendonfmu.report.kit import Row, Tile, render, rms, torque_unit
 
 Table = Mapping[str, NDArray[Any]]
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,10 +18,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tendonfmu.arrays import Data
 from tendonfmu.errors import InputError
-from tendonfmu.files import Node, Refusal, counted, format_of, read_json
-from tendonfmu.model import Finger, count, native, read_finger
+from tendonfmu.files import Node, Refusal, format_of, read_json
+from tendonfmu.model import Finger, native, read_finger
 from tendonfmu.simulate.motion_plan import LARGEST_SEED, Joints, Motion, Segment, expand_motion, expand_pushes
 from tendonfmu.simulate.plant import Plant, refused_by
 
@@ -296,86 +295,20 @@ def plant_of(rig: Rig) -> Plant:
 def describe_rig(path: Path) -> list[str]:
     """Read a rig, let the plant check it, and describe it."""
     rig = read_rig(path)
-    return _lines(rig, plant_of(rig))
-
-
-def _lines(rig: Rig, plant: Plant) -> list[str]:
-    physics: Data = rig.expanded["physics"]
-    finger = count(rig.finger)
-    masses = [float(link["mass"]) for link in physics["links"]]
-    contacts = finger.pulleys + finger.edges + finger.laws["friction"] + finger.laws["load_friction"]
-    counts = {"pulley": finger.pulleys, "edge": finger.edges, "joint": finger.laws["friction"]}
-    kinds = ", ".join(counted(number, kind) for kind, number in counts.items())
+    plant = plant_of(rig)
+    values = rig.motion.pretension["value"]
+    low, high = min(values), max(values)
+    pretension = f"{low:g} N" if low == high else f"{low:g} to {high:g} N"
+    beside = "".join(f", {column}" for column in rig.columns)
     lines = {
         "joints": f"{rig.joints}: {', '.join(rig.finger.joint_names)}",
         "tendons": f"{rig.tendons}: {', '.join(rig.finger.tendon_names)}",
-        "masses": f"{', '.join(f'{1e3 * mass:g}' for mass in masses)} g, together {1e3 * sum(masses):g} g",
-        "contacts": f"{contacts}: {kinds}, {finger.laws['load_friction']} of load; {plant.order} continuous states",
-        "effects": "; ".join(effects(physics)) or "none beyond the base model",
-        "motion": f"{rig.motion.says}; {_pretension(rig)}",
+        "physics": f"{plant.order} continuous states; {', '.join(rig.data['physics'])}",
+        "motion": f"{rig.motion.says}; pretension {pretension}",
         "pushes": str(len(rig.expanded["pushes"])),
-        "sensors": "; ".join(_sensors(rig)),
-        "integration": f"relative tolerance {plant.settings.relative_tolerance:g}",
-        "recording": _recording_words(rig),
+        "recording": "none"
+        if rig.duration is None
+        else f"{rig.duration:g} s at {rig.rate:g} Hz: tendon_force, tendon_position{beside}",
     }
     head = f"{rig.name}, version {rig.version}: a valid rig of {rig.finger.name}, seed {rig.expanded['seed']}"
     return [head, *(f"{key:<18} {text}" for key, text in lines.items())]
-
-
-def effects(physics: Data) -> Iterator[str]:
-    """Name the effects of the physics that are switched on: those of docs/reference/rig.md beyond the base model."""
-    links, tendons = physics["links"], physics.get("tendons") or []
-    friction: Data = physics.get("friction") or {}
-    if physics.get("gravity") is None or any(physics["gravity"]):
-        yield "gravity"
-    if any(link.get("limits") for link in links):
-        yield "joint limits"
-    yield from _named(
-        {
-            "hardening covers": any(link.get("cover_hardening") for link in links),
-            "joint damping": any(link.get("damping") for link in links),
-            "joint coupling": any(physics.get("joint_coupling") or []),
-            "progressive springs": any(tendon.get("hardening") for tendon in tendons),
-            "tendon damping": any(tendon.get("damping") for tendon in tendons),
-            "moment arms off the description": any(
-                tendon.get("moment_arm_scale") not in (None, 1) for tendon in tendons
-            ),
-            "moment arms that vary": any(
-                any(tendon.get(key) or []) for tendon in tendons for key in ("moment_arm_slope", "eccentricity")
-            ),
-            "bristle damping": friction.get("bristle_damping"),
-            "friction beside the load": friction.get("preload"),
-            "asymmetric friction": friction.get("asymmetry"),
-            "capstan tension loss": friction.get("tension_loss") == "capstan",
-            "edges by angle of diversion": friction.get("edges"),
-            "friction drift": (friction.get("drift") or {}).get("amplitude"),
-            "friction by heat": (friction.get("heat") or {}).get("coefficient"),
-            "wrist": physics.get("wrist"),
-            "obstacle": physics.get("obstacle"),
-        }
-    )
-
-
-def _named(switches: Mapping[str, Any]) -> Iterator[str]:
-    yield from (name for name, on in switches.items() if on)
-
-
-def _pretension(rig: Rig) -> str:
-    values = rig.motion.pretension["value"]
-    low, high = min(values), max(values)
-    return f"pretension {low:g} N" if low == high else f"pretension {low:g} to {high:g} N"
-
-
-def _sensors(rig: Rig) -> Iterator[str]:
-    sensors: Data = rig.expanded.get("sensors") or {}
-    yield f"{rig.rate:g} Hz"
-    for name, sensor in sensors.items():
-        if name != "rate" and sensor:
-            yield f"{name} with {', '.join(sensor)}"
-
-
-def _recording_words(rig: Rig) -> str:
-    if rig.duration is None:
-        return "none"
-    beside = f" and {', '.join(rig.columns)}" if rig.columns else ""
-    return f"{rig.duration:g} s: tendon_force, tendon_position{beside}"

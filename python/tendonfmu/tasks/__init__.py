@@ -1,7 +1,7 @@
 """How long computations show progress, end, resume and run in parallel.
 
-`phases` shows how far a computation is and ends it at Ctrl-C and SIGTERM, `steps` keeps the results of each step in a
-folder, and `jobs` calls a function for many inputs, here or on the workers of a cluster.
+`phases` shows how far a computation is, ends it at Ctrl-C and SIGTERM, and keeps the results of its steps in a folder,
+and `jobs` calls a function for many inputs, here or on the workers of a cluster.
 """
 
 from typing import TYPE_CHECKING
@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from .jobs import (
         Job,
         Row,
-        failed_row,
         fault_words,
         refuse_if_all_failed,
         row_file,
@@ -21,7 +20,17 @@ if TYPE_CHECKING:
         version_here,
         workers_of,
     )
-    from .phases import Phases, PhaseState, Step, ended_by_signals, uninterrupted
-    from .steps import FOLDER, Steps, digest_of, digest_of_arrays, forget_steps
+    from .phases import (
+        FOLDER,
+        Phases,
+        PhaseState,
+        Step,
+        Steps,
+        digest_of,
+        digest_of_arrays,
+        ended_by_signals,
+        forget_steps,
+        uninterrupted,
+    )
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -25,12 +25,12 @@ from tendonfmu import report as reporting
 from tendonfmu.commands import console
 from tendonfmu.commands.check import show_whether_it_belongs
 from tendonfmu.commands.command import is_hand
-from tendonfmu.commands.hand import page as pages
+from tendonfmu.commands.detection import ScoreWarning, score
+from tendonfmu.commands.hand import results as pages
 from tendonfmu.commands.hand.description import Hand, HandPart, read_hand
 from tendonfmu.commands.hand.recordings import run_hand as run_fingers
 from tendonfmu.commands.hand.recordings import split_parts
-from tendonfmu.commands.hand.ssp import build_hand_ssp
-from tendonfmu.commands.score import ScoreWarning, score
+from tendonfmu.commands.hand.results import build_hand_ssp
 from tendonfmu.errors import InputError
 from tendonfmu.options import CalibrateOptions, DiagnoseOptions, RunOptions, ScoreOptions
 
@@ -93,13 +93,11 @@ def run_hand(
     output: Path,
     options: RunOptions,
     report: Path | None = None,
-    rerun: Path | None = None,
     progress: bool | None = None,
 ) -> None:
     """Run all fingers over a recording and write one table."""
-    for name, given in (("--rerun", rerun), ("--report", report)):
-        if given is not None:
-            raise InputError(f"{model}: a hand, given with {name}; expected a finger, which it shows alone")
+    if report is not None:
+        raise InputError(f"{model}: a hand, given with --report; expected a finger, which it shows alone")
     hand, name = read_hand(model), console.name_of(output)
     console.check_table(output, recording, *hand.files)
     result = run_fingers(hand, recording, kinematics=options.kinematics)

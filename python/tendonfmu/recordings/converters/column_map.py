@@ -17,13 +17,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.files import Node, Refusal, read_json
 from tendonfmu.recordings.converters import units
+from tendonfmu.recordings.converters.units import MappedColumn
 from tendonfmu.recordings.recording import GROUPS, LABEL
 
 FORMAT = "tendonfmu-map-1"
@@ -55,31 +53,6 @@ TURNING_QUANTITIES = (units.TIME, units.LENGTH, units.ANGLE)  # a force or torqu
 
 _PREFIX = r"(?P<prefix>(?:[A-Za-z][A-Za-z0-9_.-]*?[_.-])?)"  # of a finger of a hand
 _COLUMN = re.compile(rf"{_PREFIX}(?P<group>{'|'.join(units.OF_COLUMN)})(?:\[(?P<number>[1-9][0-9]?)\])?")
-
-
-@dataclass(frozen=True)
-class MappedColumn:
-    """One of our columns."""
-
-    path: str  # its key in the map
-    source: str | int  # name of the column in the log, or its number from 1
-    factor: float = 1.0  # sign · scale · unit
-    offset: float | int | None = 0.0  # the reading that stands for zero, in the log's unit
-    stamp: str = ""  # one of `units.STAMPS` if the readings are points in time, or ""
-    zone: str = "UTC"  # time zone of texts without one
-    pattern: str = ""  # pattern of texts (`datetime.strptime`), or "": ISO 8601
-    rate: float = 0.0  # rows a second of a log without a column of time, or 0
-    wrap: float = 0.0  # readings after which a counter starts again, or 0
-    # whether its jumps are followed over many turns; otherwise readings above half of `wrap` count as negative
-    turns: bool = False
-
-    def values(self, readings: NDArray[Any]) -> NDArray[np.float64]:
-        """Return the values [N] in SI of readings [N], integer or float. The offset is a number."""
-        # no unnecessary arithmetic: numbers in SI must not change by rounding
-        if self.wrap and not self.turns:
-            readings = (readings + self.wrap / 2.0) % self.wrap - self.wrap / 2.0
-        shifted = readings - self.offset if self.offset else readings
-        return (shifted * self.factor if self.factor != 1.0 else shifted).astype(np.float64)
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
-from tendonfmu.recordings.converters.column_map import LogFormat, MappedColumn
+from tendonfmu.recordings.converters.column_map import LogFormat
 from tendonfmu.recordings.converters.log import (
     NUMBER,
     NUMBERED,
@@ -26,9 +26,8 @@ from tendonfmu.recordings.converters.log import (
     Topic,
     open_log,
 )
-from tendonfmu.recordings.converters.stamps import nanoseconds, pattern_of
 from tendonfmu.recordings.converters.text_log import TextLog
-from tendonfmu.recordings.converters.units import stated
+from tendonfmu.recordings.converters.units import MappedColumn, nanoseconds, pattern_of, stated
 from tendonfmu.recordings.traps import overflow, unwrapped, wrap_of
 
 GAP = 10.0  # median steps

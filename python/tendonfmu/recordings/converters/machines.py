@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,13 @@ from scipy import io, signal
 from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.files import are, counted
+
+
+def convert_file(name: str, file: Path, **options: Any) -> dict[str, NDArray[Any]]:
+    """Convert a file of a foreign format, "davinci" or "emps", to columns [N]. options: those of its function."""
+    convert: Callable[..., dict[str, NDArray[Any]]] = {"davinci": convert_davinci, "emps": convert_emps}[name]
+    return convert(file, **options)
+
 
 # --- da Vinci ---------------------------------------------------------------------------------------------------------
 

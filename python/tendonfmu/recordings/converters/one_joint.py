@@ -158,9 +158,9 @@ def describe_recorded_joint(name: str, recording: Recording, moment_arm: float) 
 
 def joint_description(
     name: str,
-    torque: float,
-    speed: float,
     *,
+    torque: float = 1.0,
+    speed: float = 5.0,
     coulomb: float | None = None,
     viscous: float | None = None,
     inertia: float = 0.0,

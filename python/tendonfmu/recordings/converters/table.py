@@ -19,10 +19,10 @@ from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.errors import InputError
 from tendonfmu.files import are, counted
 from tendonfmu.recordings.converters import units
-from tendonfmu.recordings.converters.column_map import ColumnMap, ConvertedLog, MappedColumn, Resampling, read_map
+from tendonfmu.recordings.converters.column_map import ColumnMap, ConvertedLog, Resampling, read_map
 from tendonfmu.recordings.converters.log import TIME_NAMES, Log, Topic, find_field, open_log
 from tendonfmu.recordings.converters.one_joint import joint_columns
-from tendonfmu.recordings.converters.stamps import DAY, nanoseconds, of_day_alone
+from tendonfmu.recordings.converters.units import DAY, MappedColumn, nanoseconds, of_day_alone
 from tendonfmu.recordings.recording import LABEL
 from tendonfmu.recordings.traps import overflow, unwrapped
 

@@ -1,18 +1,26 @@
-"""Numbers as tables and sentences show them, what several of them give together, and tables as HTML."""
+"""How numbers, tables and pages are written: one HTML file that contains its figures and needs nothing else.
+
+All texts of a page are escaped.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from html import escape
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from tendonfmu.arrays import Numbers
+from tendonfmu.drawing import Panel, Sheet, dark_colours, figures_json, packed_plotly
+from tendonfmu.files import html_template, write_files
 
 if TYPE_CHECKING:
     from tendonfmu.statistics import Interval  # imports scipy
+
 
 NBSP = "\u00a0"
 Row = tuple[str, ...]
@@ -119,3 +127,33 @@ def html_of(title: str, tables: Iterable[Table], lines: Iterable[str], warnings:
 
 def _html_row(cell: str, texts: Row) -> str:
     return "<tr>" + "".join(f"<{cell}>{escape(text)}</{cell}>" for text in texts) + "</tr>"
+
+
+# --- pages ------------------------------------------------------------------------------------------------------------
+
+
+class Tile(NamedTuple):
+    """An important number and what it is."""
+
+    value: str
+    unit: str  # may be empty
+    meaning: str
+
+
+def render(template: str, sheets: Iterable[Sheet] = (), **content: Any) -> str:
+    """Return the HTML text of a page. Its template gets the sheets by section."""
+    by_section: dict[str, list[Sheet]] = {}
+    panels: list[Panel] = []
+    for sheet in sheets:
+        by_section.setdefault(sheet.section, []).append(replace(sheet, first=len(panels)))
+        panels += sheet.panels
+    content["drawn"] = figures_json(panels) if panels else ""
+    if panels:
+        content |= {"plotly": packed_plotly(), "dark_colours": dark_colours()}
+    return html_template(template).render(figures=by_section, **content)
+
+
+def write_figures(page: Path, kicker: str, heading: str, sheets: Iterable[Sheet]) -> None:
+    """Write a page of figures; its folder is made if missing."""
+    text = render("figures.html.jinja", sheets, title=heading, kicker=kicker, heading=heading)
+    write_files(page.parent, {page.name: text.encode()})
