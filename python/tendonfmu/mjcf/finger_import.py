@@ -362,6 +362,8 @@ def _of_tendons(
     velocities = [joint.velocity for joint in joints]
     for tendon in tendons:
         motors = motors_of(model, tendon)
+        if tendon.frictionloss and motors:
+            yield f"tendon {tendon.name}: frictionloss {tendon.frictionloss:g} N of the spring between motor and finger"
         for joint in model.joints:
             if joint.velocity not in velocities and moves[tendon.index, joint.velocity] and joint not in motors:
                 yield f"tendon {tendon.name}: also moves joint {joint.name}, which is not in --joints"
