@@ -3,14 +3,14 @@
 Each form is fitted from several starts to the same windows of the recordings and judged by its error on contiguous
 parts that are held out: all numbers are refitted without a part by one Gauss-Newton step from the whole fit. A form
 with more numbers must be better by `MATERIAL` and by `CERTAIN` standard errors over the parts, else the simpler one
-stays. Parts are added to the relative and to the absolute form, and the better end is taken by the same rule.
+stays. Parts are added to the relative and to the absolute form, and the better end is taken.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial, reduce
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -86,7 +86,7 @@ def choose_memory(
     forms = [search.fit(name, rows) for name, rows in _whole_forms(finger.data, force)]
     least = min(form.errors.sum() for form in forms)
     grown = [search.grown(form) for form in forms if form.errors.sum() < NEAR * least]
-    best = reduce(search.simpler, sorted(grown, key=lambda form: (form.numbers, form.errors.sum())))
+    best = min(grown, key=lambda form: form.errors.sum())
     best = search.simpler(plain, best)
     return MemoryChoice(search.refined(best), best, tuple(search.tried))
 
@@ -133,8 +133,12 @@ class _Search:
         rigid = _without_times(best.rows)
         starts = [_scaled(rigid, factor) for factor in LONGER]
         best = self.simpler(self.fit(f"{best.name}, no relaxation", *starts, near=best), best)
-        best = self.simpler(best, self.fit(f"{best.name}, two elements", _doubled(best.rows), near=best))
+        whole = best
         best = self.simpler(best, self.fit(f"{best.name}, levels", _by_level(data, best.rows), near=best))
+        single = best
+        best = self.simpler(best, self.fit(f"{best.name}, two elements", _doubled(best.rows), near=best))
+        if best is not single is whole:  # levels may differ in both elements only
+            best = self.simpler(best, self.fit(f"{best.name}, levels", _by_level(data, best.rows), near=best))
         for name, rows in _pruned(best):
             best = self.simpler(self.fit(name, rows, near=best), best)
         return best
