@@ -14,6 +14,7 @@ from tendonfmu.diagnosis.answer import not_taken
 from tendonfmu.diagnosis.effects import Place, Term, Where, by_name
 from tendonfmu.diagnosis.effects.words import presliding
 from tendonfmu.diagnosis.result import Cause
+from tendonfmu.diagnosis.search import FORM, ExtensionSearch
 from tendonfmu.diagnosis.selection import Judged, names_needed
 from tendonfmu.statistics import Interval
 
@@ -38,6 +39,20 @@ def in_nominal(data: Any, effect: Term) -> bool:
     base = SimpleNamespace(nominal=SimpleNamespace(data=data), samples=samples)
     made._searched = cast("Any", SimpleNamespace(base=base))
     return made._is_in_nominal(effect)
+
+
+def test_what_resembles_friction_removes_more_than_another_form_of_its_memory() -> None:
+    search = object.__new__(ExtensionSearch)
+    search._least_gain = 0.03
+    before = np.linspace(0.9, 1.1, 20)
+    after = 0.8 * before
+    just = (before - after).sum() / FORM**2
+    for of_memory, is_more in ((0.0, True), (0.9 * just, True), (1.1 * just, False)):
+        search.of_memory = of_memory
+        assert search.lowers("preload_friction", before, after) == is_more
+        assert search.lowers("gravity", before, after)
+    assert not search.lowers("gravity", before, 0.99 * before), "not material"
+    assert not search.lowers("gravity", before, np.where(np.arange(20) == 3, 0.0, before + 0.02)), "not certain"
 
 
 def test_only_laws_of_the_nominal_description_are_asked_about(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,7 +14,7 @@ from tendonfmu.diagnosis.answer import Asked, Compared, answered, cause_of, not_
 from tendonfmu.diagnosis.base import Base, refitted
 from tendonfmu.diagnosis.contact_scan import detection_gain, event_gain, events_of, without_events
 from tendonfmu.diagnosis.delay import DELAY
-from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION, OF_LAW, Place, Term, Where
+from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION, Place, Term, Where
 from tendonfmu.diagnosis.effects.places import law_of, thresholds
 from tendonfmu.diagnosis.extension_fit import (
     PRESLIDING,
@@ -30,20 +30,13 @@ from tendonfmu.diagnosis.next_experiment import Experiments, Question, plan_expe
 from tendonfmu.diagnosis.remainder import measure_remainder, remainder_map, unexplained_of
 from tendonfmu.diagnosis.result import Cause, CausePlace, Diagnosis, Invisible, Unexplained, by_gain, with_error
 from tendonfmu.diagnosis.samples import Samples, Span, as_described, span_of
-from tendonfmu.diagnosis.search import ExtensionSearch, calibrated, search, terms_of
+from tendonfmu.diagnosis.search import FORM, LIKE_A_LAW, ExtensionSearch, calibrated, search, terms_of
 from tendonfmu.diagnosis.selection import SIGNIFICANCE, Judged, confirmed, invisible_effects, names_needed, step_p_value
-from tendonfmu.estimate import SCALING
 from tendonfmu.model import extended_row
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import Interval
 
 # --- gains on unseen data ---------------------------------------------------------------------------------------------
-
-
-# Of the rms that a memory explains: another form of it explains so much more. What depends on the same motions and
-# loads as friction, or scales the torque, resembles that.
-FORM = 0.07
-LIKE_A_LAW = {*OF_LAW, *SCALING}
 
 
 @dataclass(frozen=True)

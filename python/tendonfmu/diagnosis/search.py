@@ -28,8 +28,9 @@ from tendonfmu.diagnosis.base import POSITION, Base, refitted, remembering
 from tendonfmu.diagnosis.candidate_columns import EVERYWHERE, Candidate, Proposal
 from tendonfmu.diagnosis.contact_scan import events_of
 from tendonfmu.diagnosis.delay import DELAY
-from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION, Place, Term, Where
+from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION, OF_LAW, Place, Term, Where
 from tendonfmu.diagnosis.extension_fit import (
+    PRESLIDING,
     REMEMBERING,
     FittedModel,
     extended_description,
@@ -214,6 +215,10 @@ MOST_CAUSES = 8
 LARGE = 0.1  # of the rms: the memory was fitted to what lacked such a cause
 MOST_FITTED = 3  # effects that columns cannot distinguish
 NEARLY = 0.8  # of the gain of a single sensor: prior knowledge always takes a part from several together
+# Of the rms that a memory explains: another form of it explains so much more. What depends on the same motions and
+# loads as friction, or scales the torque, resembles that.
+FORM = 0.07
+LIKE_A_LAW = {*OF_LAW, *SCALING}
 
 
 @dataclass(frozen=True)
@@ -229,6 +234,7 @@ class ExtensionSearch(CauseSearch):
     """Adds cause after cause to a base, and keeps the model with all of them."""
 
     events: tuple[Event, ...] = ()  # contact and stalls, which the samples of the base lack
+    of_memory = 0.0  # (N·m)² on unseen stretches that a new memory explains
 
     def __init__(self, base: Base, least_gain: float) -> None:
         super().__init__(MOST_CAUSES + len(base.start))
@@ -239,6 +245,9 @@ class ExtensionSearch(CauseSearch):
 
     def run(self, step: Step) -> None:
         self.view = self.base.look(self.model)
+        learned = any(cause.effect == PRESLIDING for cause in self.causes)
+        left = (view.selection.base.sum() for view in (self.first, self.view))
+        self.of_memory = float(np.subtract(*left)) if learned else 0.0
         super().run(step)
 
     def _try_next(self, tried: set[str]) -> tuple[Judged, bool] | None:
@@ -297,15 +306,21 @@ class ExtensionSearch(CauseSearch):
     def _take(self, trial: Trial) -> bool:
         """Keep a further cause if it lowers the error on unseen stretches materially and certainly."""
         before, after, model, cause = self.view.selection.base, trial.error, trial.model, trial.cause
-        gain, error = rms_gain(before, after) if model is not None else (0.0, 0.0)
-        if model is None or gain < self._least_gain or gain <= CERTAIN * error:
+        if model is None or not self.lowers(cause.effect, before, after):
             return False
+        gain, error = rms_gain(before, after)
         p_value = cause.p_value if cause.p_value < SIGNIFICANCE else step_p_value(before, after)
         self.causes.append(replace(cause, gain=with_error(gain, error), p_value=p_value))
         self.model = self._settled(refitted(model, self.base.samples, self.base.settings), gain)
         self.view = self.view.lean  # frees memory for the next one
         self.view = self.base.look(self.model)
         return True
+
+    def lowers(self, effect: str, before: Numbers, after: Numbers) -> bool:
+        """Return whether Σ e² [K] falls materially, certainly, and by more than another form of the memory does."""
+        gain, error = rms_gain(before, after)
+        is_more = effect not in LIKE_A_LAW or (before - after).sum() >= FORM**2 * self.of_memory
+        return bool(gain >= self._least_gain and gain > CERTAIN * error and is_more)
 
     def _settled(self, model: FittedModel, gain: float) -> FittedModel:
         """Return a model with its memory chosen anew, from several starts, if that is better beside a large cause."""
