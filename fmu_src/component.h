@@ -14,6 +14,7 @@ enum { PLACES_MOST = 256 }; /* of one round: a call with more takes some */
 typedef struct variable_places {
   size_t references, elements;
   int inputs, outputs, parameters; /* whether some are */
+  int apart;                       /* they do not stand one after another */
   unsigned of[PLACES_MOST];        /* [references] value references */
   unsigned place[PLACES_MOST];     /* [elements] variables_place() */
 } variable_places;

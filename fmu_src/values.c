@@ -62,6 +62,7 @@ static fmu_status find_places(component* c, fmu_function function, variable_type
     for (size_t k = 0; k < extent; ++k) {
       places->place[places->elements++] = (unsigned)(first + k);
     }
+    places->apart |= first + extent != places->place[0] + places->elements;
     places->of[places->references++] = references[i];
     places->inputs |= variable_causality_of(&found) == CAUSALITY_INPUT;
     places->outputs |= variable_causality_of(&found) == CAUSALITY_OUTPUT;
@@ -89,6 +90,11 @@ static void put_value(void* values, value_format format, size_t at, double value
     case VALUES_BOOL: ((_Bool*)values)[at] = value != 0.0; break;
     default: ((double*)values)[at] = value; break;
   }
+}
+
+/* Whether the values of a round stand in both arrays one after another, in the same format. */
+static int is_a_copy(const variable_places* places, variable_type type, value_format format) {
+  return !places->apart && type == VARIABLE_REAL && format == VALUES_DOUBLE;
 }
 
 /* --- reading ------------------------------------------------------------------------------------------------------ */
@@ -121,6 +127,11 @@ fmu_status values_get(component* c, fmu_function function, variable_type type, c
     }
     if (c->waiting && places->outputs) { /* later a step brings the outputs with it */
       status = update_outputs(c, function, places->of, places->references);
+    }
+    if (is_a_copy(places, type, format)) {
+      memcpy((double*)values + at, v->numbers + places->place[0], places->elements * sizeof(double));
+      at += places->elements;
+      continue;
     }
     for (size_t k = 0; k < places->elements; ++k) {
       const size_t place = places->place[k];
@@ -197,8 +208,13 @@ fmu_status values_set(component* c, fmu_function function, variable_type type, c
   }
   for (size_t i = 0, at = 0; i < count; i += places->references) {
     find_places(c, function, type, references + i, count - i, places);
-    for (size_t k = 0; k < places->elements; ++k) {
-      c->values.numbers[places->place[k]] = given_value(values, format, at++, type);
+    if (is_a_copy(places, type, format)) {
+      memcpy(c->values.numbers + places->place[0], (const double*)values + at, places->elements * sizeof(double));
+      at += places->elements;
+    } else {
+      for (size_t k = 0; k < places->elements; ++k) {
+        c->values.numbers[places->place[k]] = given_value(values, format, at++, type);
+      }
     }
     if (places->parameters) {
       give_settings(c, places);

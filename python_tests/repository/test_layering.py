@@ -109,10 +109,10 @@ PARTS = {
         listed_sources("estimation/CMakeLists.txt", "set(TENDONFMU_ESTIMATION_SOURCES"),
         CORE_HEADERS | {"tendonfmu.h", "core_inside.h", "tendonfmu_estimation.hpp"},
     ),
-    # The model is judged against the simulated finger: they share the reader of JSON and nothing else.
+    # The model is judged against the simulated finger: they share the reader of JSON, a hash and nothing else.
     "plant": (
         listed_sources("plant/CMakeLists.txt", "set(TENDONFMU_PLANT_SOURCES"),
-        {"tendonfmu_plant.h", "tendonfmu_description.h", "json_node.h", "description_error.h"},
+        {"tendonfmu_plant.h", "tendonfmu_description.h", "json_node.h", "description_error.h", "bytes.h"},
     ),
 }
 HEADERS = {file.name for part in ("runtime", "fmu_src") for file in (ROOT / part).rglob("*.h")}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import re
 import signal
 import subprocess
 import sys
@@ -36,6 +37,9 @@ def short_rig(**changes: Any) -> dict[str, Any]:
     data["pushes"] = [{"start": 0.5, "rise": 0.1, "hold": 0.3, "fall": 0.1, "force": 1.5, "direction": [0.0, 0.0, 1.0]}]
     data["settle"] = 1.0
     return data | changes
+
+
+GAVE_UP = r" at t = 0\.\d+ s \(CVODE flag -\d+\): (try|check) "
 
 
 def solver_failure() -> dict[str, Any]:
@@ -148,7 +152,7 @@ def test_a_solver_failure_leaves_no_file(call: Call, tmp_path: Path) -> None:
     answer = call("simulate", rig, "-o", "rec.parquet", "--truth", "truth.parquet")
     assert (answer.status, answer.out) == (2, "")
     assert len(answer.err.splitlines()) == 1
-    assert answer.err.startswith(f"tendonfmu: {rig}: ") and "t = " in answer.err and "try" in answer.err
+    assert answer.err.startswith(f"tendonfmu: {rig}: ") and re.search(GAVE_UP, answer.err)
     assert sorted(file.name for file in tmp_path.iterdir()) == ["rec.parquet", "rig.json"]
     assert (tmp_path / "rec.parquet").read_text() == "what was there before"
 
@@ -156,7 +160,7 @@ def test_a_solver_failure_leaves_no_file(call: Call, tmp_path: Path) -> None:
 def test_the_binding_tells_solver_failures_from_bad_calls(tmp_path: Path) -> None:
     plant = Plant(read_rig(written(tmp_path, solver_failure())).json())
     plant.initialise()
-    with pytest.raises(SolverError, match=r"at t = 0\.\d+ s .*try"):
+    with pytest.raises(SolverError, match=GAVE_UP):
         plant.advance(2.0)
     assert plant.time == 0.0  # where it stood
     fresh = Plant(read_rig(written(tmp_path, short_rig())).json())

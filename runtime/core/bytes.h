@@ -4,6 +4,10 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 uint32_t load_u32(const unsigned char* from);
 uint64_t load_u64(const unsigned char* from);
 double load_f64(const unsigned char* from);
@@ -17,3 +21,7 @@ void store_doubles(unsigned char* to, const double* from, size_t count);
 
 /* 64-bit hash of bytes: finds damage, is no protection against intent. */
 uint64_t hash_bytes(const void* bytes, size_t size, uint64_t seed);
+
+#ifdef __cplusplus
+}
+#endif

@@ -222,13 +222,16 @@ static tendonfmu_status take(tendonfmu_finger* finger, double time, const tendon
   return TENDONFMU_BAD_SAMPLE;
 }
 
+static tendonfmu_status already_taken(const tendonfmu_finger* finger) {
+  return fail(finger, TENDONFMU_WRONG_ORDER, "the first sample is already taken: expected a reset before another one");
+}
+
 tendonfmu_status tendonfmu_initialise(tendonfmu_finger* finger, double time, const tendonfmu_inputs* inputs) {
   if (!finger || !inputs) {
     return missing(finger);
   }
   if (tendonfmu_is_initialised(finger)) {
-    return fail(finger, TENDONFMU_WRONG_ORDER,
-                "the first sample is already taken: expected a reset before another one");
+    return already_taken(finger);
   }
   return take(finger, time, inputs);
 }
@@ -243,6 +246,45 @@ tendonfmu_status tendonfmu_step(tendonfmu_finger* finger, double time, const ten
   return take(finger, time, inputs);
 }
 
+/* of a row, after that of the row before; the bias begins with the first sample that it may learn from */
+static sample_guide guide_of_row(const tendonfmu_finger* finger, const tendonfmu_guide* guide, size_t row) {
+  const sample_guide before = finger->guide;
+  const int waits = before.begins && !before.learns && !finger->derived.settings.has_initial_torque;
+  return (sample_guide){.guides = 1,
+                        .begins = row == 0 || waits,
+                        .learns = !guide->learns || guide->learns[row],
+                        .known_torque = guide->known_torque ? guide->known_torque + row * finger->joints : NULL};
+}
+
+static void give_variance(const tendonfmu_finger* finger, double* variance, size_t row) {
+  for (size_t j = 0; variance && j < finger->joints; ++j) {
+    variance[row * finger->joints + j] = finger->guide.begins ? NAN : finger->scratch.residual_variance[j];
+  }
+}
+
+/* guide: NULL where the finger decides itself what the bias learns from */
+static tendonfmu_status take_rows(tendonfmu_finger* finger, size_t samples, const double* time,
+                                  const tendonfmu_inputs* inputs, const tendonfmu_guide* guide,
+                                  const tendonfmu_outputs* outputs, size_t* done) {
+  tendonfmu_status status = TENDONFMU_OK;
+  size_t row = 0;
+  for (; row < samples; ++row) {
+    const tendonfmu_inputs sample = samples_row(finger, inputs, row);
+    finger->guide = guide ? guide_of_row(finger, guide, row) : (sample_guide){0};
+    status = take(finger, time[row], &sample);
+    if (status != TENDONFMU_OK) {
+      break;
+    }
+    samples_give_outputs(finger, outputs, row);
+    give_variance(finger, guide ? guide->variance : NULL, row);
+  }
+  finger->guide = (sample_guide){0};
+  if (done) {
+    *done = row;
+  }
+  return status;
+}
+
 tendonfmu_status tendonfmu_run(tendonfmu_finger* finger, size_t samples, const double* time,
                                const tendonfmu_inputs* inputs, const tendonfmu_outputs* outputs, size_t* done) {
   if (done) {
@@ -251,18 +293,25 @@ tendonfmu_status tendonfmu_run(tendonfmu_finger* finger, size_t samples, const d
   if (!finger || !inputs || !outputs || (!time && samples)) {
     return missing(finger);
   }
-  for (size_t row = 0; row < samples; ++row) {
-    const tendonfmu_inputs sample = samples_row(finger, inputs, row);
-    const tendonfmu_status status = take(finger, time[row], &sample);
-    if (status != TENDONFMU_OK) {
-      return status;
-    }
-    samples_give_outputs(finger, outputs, row);
-    if (done) {
-      *done = row + 1;
-    }
+  return take_rows(finger, samples, time, inputs, NULL, outputs, done);
+}
+
+tendonfmu_status tendonfmu_run_guided(tendonfmu_finger* finger, size_t samples, const double* time,
+                                      const tendonfmu_inputs* inputs, const tendonfmu_guide* guide,
+                                      const tendonfmu_outputs* outputs, size_t* done) {
+  if (done) {
+    *done = 0;
   }
-  return TENDONFMU_OK;
+  if (!finger || !inputs || !guide || !outputs || (!time && samples)) {
+    return missing(finger);
+  }
+  if (finger->derived.settings.watches_sensors) {
+    return fail(finger, TENDONFMU_BAD_ARGUMENT, "a guided run with sensor_fault: expected a finger without");
+  }
+  if (samples && tendonfmu_is_initialised(finger)) {
+    return already_taken(finger);
+  }
+  return take_rows(finger, samples, time, inputs, guide, outputs, done);
 }
 
 tendonfmu_status tendonfmu_get_outputs(const tendonfmu_finger* finger, const tendonfmu_outputs* outputs) {

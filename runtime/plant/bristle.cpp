@@ -9,15 +9,14 @@ namespace tendonfmu::plant {
 
 law_columns::law_columns(std::size_t count) {
   for (std::vector<double>* column :
-       {&velocity, &inverse_length, &break_away, &break_away_by_angle, &sliding, &sliding_by_angle, &sliding_by_speed,
-        &excess, &excess_by_angle, &argument, &argument_by_speed, &viscous, &viscous_by_angle}) {
+       {&velocity, &inverse_length, &break_away, &sliding, &excess, &argument, &viscous}) {
     column->assign(padded(count), 0.0);
   }
 }
 
 response_columns::response_columns(std::size_t count) {
-  for (std::vector<double>* column : {&share, &rate, &share_by_bristle, &share_by_velocity, &share_by_angle,
-                                      &share_by_level, &rate_by_bristle, &rate_by_velocity, &rate_by_angle}) {
+  for (std::vector<double>* column :
+       {&share, &rate, &share_by_bristle, &share_by_velocity, &rate_by_bristle, &rate_by_velocity}) {
     column->assign(padded(count), 0.0);
   }
 }
@@ -30,10 +29,7 @@ void set_law(const law& one, double v, int stribeck_exponent, std::size_t k, law
   laws->sliding[k] = side.sliding;
   laws->excess[k] = side.break_away - side.sliding;
   laws->argument[k] = stribeck_exponent == 1 ? x : x * x;
-  laws->argument_by_speed[k] = (stribeck_exponent == 1 ? 1.0 : 2.0 * x) * side.stribeck_rate;
   laws->viscous[k] = side.viscous;
-  laws->break_away_by_angle[k] = laws->sliding_by_angle[k] = laws->sliding_by_speed[k] = 0.0;
-  laws->excess_by_angle[k] = laws->viscous_by_angle[k] = 0.0;
 }
 
 namespace {
@@ -74,21 +70,11 @@ inline __attribute__((always_inline)) void respond_two(const law_columns& law, c
     return;
   }
 
-  const pair g_by_velocity =
-      rubs ? sign * (load(law.sliding_by_speed, k) - excess * left * load(law.argument_by_speed, k)) * inverse_c : zero;
-  const pair c_by_angle = load(law.break_away_by_angle, k);
-  const pair g_by_angle =
-      rubs ? (load(law.sliding_by_angle, k) + load(law.excess_by_angle, k) * left - g * c_by_angle) * inverse_c : zero;
   const pair a_by_velocity = sign * with.damping_time * inverse_length * fade * fade;
-  const pair stiffer = a * bent * inverse_g, turning = per_second * bent * inverse_g;
   store(strength * (1.0 - a * inverse_g), k, &r->share_by_bristle);
-  store(strength * (a_by_velocity * (sign - bent) + stiffer * g_by_velocity) + viscous, k, &r->share_by_velocity);
-  store(with.level * (c_by_angle * bending + c * stiffer * g_by_angle) + load(law.viscous_by_angle, k) * v, k,
-        &r->share_by_angle);
-  store(c * bending, k, &r->share_by_level);
+  store(strength * a_by_velocity * (sign - bent) + viscous, k, &r->share_by_velocity);
   store(-per_second * inverse_g, k, &r->rate_by_bristle);
-  store((1.0 - sign * bent) * inverse_length + turning * g_by_velocity, k, &r->rate_by_velocity);
-  store(turning * g_by_angle, k, &r->rate_by_angle);
+  store((1.0 - sign * bent) * inverse_length, k, &r->rate_by_velocity);
 }
 
 template <bool with_slopes>
@@ -114,38 +100,25 @@ const law_side& side_of(const law& one, double v) {
   return v < 0.0 ? one.negative : one.positive;
 }
 
-/* A number of neighbouring laws in between, and its slope by the angle. */
-struct blend {
-  double share, per_angle; /* of the upper law; 1/width */
-
-  void put(double low, double high, double* value, double* slope) const {
-    *value = low + share * (high - low);
-    *slope = (high - low) * per_angle;
-  }
-};
-
 /* Values are interpolated, not numbers of laws: where neighbours share the Stribeck velocity that is the same; where
  * they do not, both values are taken here and the row keeps nothing to add. */
-void set_between(const law& low, const law& high, const blend& at, double v, int exponent, std::size_t k,
+void set_between(const law& low, const law& high, double share, double v, int exponent, std::size_t k,
                  law_columns* laws) {
   set_law(low, v, exponent, k, laws);
   const law_side &a = side_of(low, v), &b = side_of(high, v);
-  at.put(low.break_away, high.break_away, &laws->break_away[k], &laws->break_away_by_angle[k]);
-  at.put(a.viscous, b.viscous, &laws->viscous[k], &laws->viscous_by_angle[k]);
+  const auto between = [share](double x, double y) { return x + share * (y - x); };
+  laws->break_away[k] = between(low.break_away, high.break_away);
+  laws->viscous[k] = between(a.viscous, b.viscous);
+  double excess_of_a = a.break_away - a.sliding, excess_of_b = b.break_away - b.sliding;
   if (a.stribeck_rate == b.stribeck_rate) {
-    at.put(a.sliding, b.sliding, &laws->sliding[k], &laws->sliding_by_angle[k]);
-    at.put(a.break_away - a.sliding, b.break_away - b.sliding, &laws->excess[k], &laws->excess_by_angle[k]);
+    laws->sliding[k] = between(a.sliding, b.sliding);
+    laws->excess[k] = between(excess_of_a, excess_of_b);
     return;
   }
-  const double left_of_a = exponential(-laws->argument[k]), rate_of_a = laws->argument_by_speed[k];
   const double x = std::fabs(v) * b.stribeck_rate;
-  const double left_of_b = exponential(exponent == 1 ? -x : -x * x);
-  const double rate_of_b = (exponent == 1 ? 1.0 : 2.0 * x) * b.stribeck_rate;
-  const double excess_of_a = (a.break_away - a.sliding) * left_of_a,
-               excess_of_b = (b.break_away - b.sliding) * left_of_b;
-  at.put(a.sliding + excess_of_a, b.sliding + excess_of_b, &laws->sliding[k], &laws->sliding_by_angle[k]);
-  double unused;
-  at.put(-excess_of_a * rate_of_a, -excess_of_b * rate_of_b, &laws->sliding_by_speed[k], &unused);
+  excess_of_a *= exponential(-laws->argument[k]);
+  excess_of_b *= exponential(exponent == 1 ? -x : -x * x);
+  laws->sliding[k] = between(a.sliding + excess_of_a, b.sliding + excess_of_b);
   laws->excess[k] = 0.0;
 }
 
@@ -162,48 +135,30 @@ void set_interpolated(const law_by_angle& points, double angle, double v, int ex
   while (angles[upper] <= angle) {
     ++upper;  // few points: a search would take longer
   }
-  const double per_angle = 1.0 / (angles[upper] - angles[upper - 1]);
-  const blend at = {(angle - angles[upper - 1]) * per_angle, per_angle};
-  set_between(points.laws[upper - 1], points.laws[upper], at, v, exponent, k, laws);
+  const double share = (angle - angles[upper - 1]) * (1.0 / (angles[upper] - angles[upper - 1]));
+  set_between(points.laws[upper - 1], points.laws[upper], share, v, exponent, k, laws);
 }
 
-struct scale_and_slope {
-  double level, slope;
-};
-
-/* Level of the sliding friction by the angle of diversion θ, and its slope by θ. The sine with its own coefficient for
+/* Level of the sliding friction by the angle of diversion θ. The sine with its own coefficient for
  * each sign of θ is the form of Ludovico et al. (reference [4] of the paper); 1 − e^(−μ|θ|) and, where the tension
  * falls exponentially anyway, μ|θ| are the capstan's (L. Euler, 1769). */
-scale_and_slope diversion_level(const diversion& turn, double theta) {
+double diversion_level(const diversion& turn, double theta) {
   const double sign = theta < 0.0 ? -1.0 : 1.0;
   const double coefficient = theta < 0.0 ? turn.negative_coefficient : turn.coefficient;
   switch (turn.shape) {
-    case diversion::form::sine: {
-      const sine_and_cosine<double> both = sine_cosine(theta);
-      const double turned = both.sine < 0.0 ? -1.0 : 1.0;
-      return {coefficient * turned * both.sine, coefficient * turned * both.cosine};
-    }
-    case diversion::form::capstan_share: {
-      const double rest = exponential(-coefficient * sign * theta);
-      return {1.0 - rest, sign * coefficient * rest};
-    }
-    default: return {coefficient * sign * theta, sign * coefficient};
+    case diversion::form::sine: return coefficient * std::fabs(sine(theta));
+    case diversion::form::capstan_share: return 1.0 - exponential(-coefficient * sign * theta);
+    default: return coefficient * sign * theta;
   }
 }
 
 void set_diverted(const friction_site& site, double angle, double v, int exponent, std::size_t k, law_columns* laws) {
   const double theta = site.turn.rest + site.turn.slope * (angle - site.turn.centre);
-  const scale_and_slope level = diversion_level(site.turn, theta);
-  const double scale = level.level / site.turn.normal, by_angle = site.turn.slope * level.slope / site.turn.normal;
+  const double scale = diversion_level(site.turn, theta) / site.turn.normal;
   set_law(site.friction.laws.front(), v, exponent, k, laws);
-  const auto multiply = [&](std::vector<double>& value, std::vector<double>& slope) {
-    slope[k] = by_angle * value[k];
-    value[k] *= scale;
-  };
-  multiply(laws->break_away, laws->break_away_by_angle);
-  multiply(laws->sliding, laws->sliding_by_angle);
-  multiply(laws->excess, laws->excess_by_angle);
-  multiply(laws->viscous, laws->viscous_by_angle);
+  for (std::vector<double>* column : {&laws->break_away, &laws->sliding, &laws->excess, &laws->viscous}) {
+    (*column)[k] *= scale;
+  }
 }
 
 }  // namespace

@@ -23,25 +23,24 @@ constexpr std::size_t padded(std::size_t count) {
 
 /* The law of every contact at its velocity and the present angle:
  *   g = sliding + excess e^(−argument),   argument = (|v|/v_s)^δ
- * `..._by_angle`: slopes by the angle of the joint before. */
+ */
 struct law_columns {
-  std::vector<double> velocity;                        /* m/s, rad/s */
-  std::vector<double> inverse_length;                  /* 1/d */
-  std::vector<double> break_away, break_away_by_angle; /* c */
-  std::vector<double> sliding, sliding_by_angle, sliding_by_speed;
-  std::vector<double> excess, excess_by_angle;
-  std::vector<double> argument, argument_by_speed;
-  std::vector<double> viscous, viscous_by_angle;
+  std::vector<double> velocity;       /* m/s, rad/s */
+  std::vector<double> inverse_length; /* 1/d */
+  std::vector<double> break_away;     /* c */
+  std::vector<double> sliding;
+  std::vector<double> excess;
+  std::vector<double> argument;
+  std::vector<double> viscous;
 
   explicit law_columns(std::size_t count);
 };
 
-/* What every contact does: the share λ and its slopes by bristle, velocity, angle and level; the bristle's rate w' in
- * 1/s and its slopes. Slopes are filled in on request. */
+/* What every contact does: the share λ and the bristle's rate w' in 1/s, with their slopes by bristle and velocity on
+ * request: those by velocity at a constant level g. */
 struct response_columns {
   std::vector<double> share, rate;
-  std::vector<double> share_by_bristle, share_by_velocity, share_by_angle, share_by_level;
-  std::vector<double> rate_by_bristle, rate_by_velocity, rate_by_angle;
+  std::vector<double> share_by_bristle, share_by_velocity, rate_by_bristle, rate_by_velocity;
 
   explicit response_columns(std::size_t count);
 };
@@ -56,7 +55,7 @@ struct response_settings {
 /* Responses to bristles w [padded count]. */
 void respond(const law_columns& laws, const response_settings& settings, const double* w, response_columns* responses);
 
-/* Puts a law into row k: velocity v, nothing depends on the angle. */
+/* Puts a law into row k: velocity v. */
 void set_law(const law& one, double v, int stribeck_exponent, std::size_t k, law_columns* laws);
 
 /* Puts the law of `site` into row k, by working points or by the edge's diversion. angle: rad, of the joint before; v:

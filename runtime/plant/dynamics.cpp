@@ -28,9 +28,7 @@ preload preload_at(double preload_force, double tension) {
 }  // namespace
 
 dynamics::dynamics(const rig& rig) : rig_(rig), layout_(rig), values_(rig.bristle_count()) {
-  const std::size_t arms = rig.tendon_count() * rig.joint_count();
-  values_.arm.resize(arms);
-  values_.arm_slope.resize(arms);
+  values_.arm.resize(rig.tendon_count() * rig.joint_count());
   values_.passed.resize(padded(rig.sites.size()));
   values_.tension.resize(rig.sites.size());
   values_.loss_by_share.resize(rig.sites.size());
@@ -53,11 +51,10 @@ void dynamics::move_tendons(const double* state) {
   e.motor_power = 0.0;
   for (std::size_t i = 0; i < layout_.tendons; ++i) {
     const tendon& tendon = rig_.tendons[i];
-    double *arm = &e.arm[i * n], *slope = &e.arm_slope[i * n];
+    double* arm = &e.arm[i * n];
     double path = 0.0, path_speed = 0.0;
     for (std::size_t j = 0; j < n; ++j) {
       arm[j] = arm_at(tendon.arms[j], q[j]);
-      slope[j] = arm_slope_at(tendon.arms[j], q[j]);
       path += path_of(tendon.arms[j], q[j]);
       path_speed += arm[j] * speed[j];
     }
@@ -120,11 +117,6 @@ void dynamics::bend_bristles(const double* state) {
   }
   std::copy(state + layout_.bristle(), state + layout_.heat(), e.bristles.begin());
   respond(e.laws, {e.level, settings.bristle_damping, slopes_}, e.bristles.data(), &e.responses);
-  for (std::size_t s = 0; slopes_ && s < first; ++s) {
-    if (!rig_.sites[s].bends) {
-      e.responses.share_by_angle[s] = e.responses.rate_by_angle[s] = 0.0;
-    }
-  }
 }
 
 /* Tension along every tendon, and what it leaves for the joints. */
@@ -237,7 +229,6 @@ void dynamics::evaluate(double time, const double* state, const contact_modes* m
   const double run_in =
       1.0 + friction.drift_amplitude * (1.0 - exponential(-std::max(time, 0.0) / friction.drift_time));
   e.level = run_in * (1.0 + friction.heat_coefficient * heat);
-  e.level_by_heat = run_in * friction.heat_coefficient;
 
   // bodies and what presses on them
   move_chain(rig_, q, speed, &e.motion);
@@ -316,7 +307,7 @@ void dynamics::roots(const double* state, double* root) const {
     root[m + 2 * j + 1] = state[j] - rig_.links[j].upper;
   }
   if (rig_.obstacle.present) {
-    chain_motion<double> motion;
+    chain_motion motion;
     move_chain(rig_, state, state + layout_.speed(), &motion);
     root[m + 2 * n] = penetrate(rig_.obstacle, motion).depth;
   }

@@ -1,4 +1,4 @@
-/* The finger's differential equations and their Jacobian. */
+/* The finger's differential equations. */
 #pragma once
 
 #include <vector>
@@ -47,21 +47,21 @@ struct commands {
   free_push push;
 };
 
-/* Intermediate values of one evaluation: what outputs and Jacobian are made of. */
+/* Intermediate values of one evaluation: what outputs and Newton's matrix are made of. */
 struct evaluation {
   double time = 0.0;
   contact_modes modes;
-  chain_motion<double> motion;
+  chain_motion motion;
   double mass[max_joints * max_joints];
   double acceleration[max_joints];
   double rigid_torque[max_joints];               /* velocity terms and gravity: inverse dynamics at q̈ = 0 */
   double stop_torque[max_joints], stop_loss = 0; /* torque on the finger, N·m; W */
-  contact_torque<double> contact;
-  std::vector<double> arm, arm_slope; /* [m × n] */
+  contact_torque contact;
+  std::vector<double> arm; /* [m × n] */
   double elongation[max_tendons], elongation_speed[max_tendons];
   double force[max_tendons], force_by_elongation[max_tendons], force_by_speed[max_tendons]; /* at the spring */
   double spring_loss = 0; /* W, of the tendons' dampers */
-  double level = 1.0, level_by_heat = 0.0;
+  double level = 1.0;
   law_columns laws;             /* of sites and joint sites */
   std::vector<double> bristles; /* [padded] */
   response_columns responses;

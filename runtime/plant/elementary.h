@@ -77,13 +77,12 @@ inline double logarithm(double x) {
   return exponent * 6.93147180369123816490e-01 + (exponent * 1.90821492927058770002e-10 + 2.0 * (s + s * series));
 }
 
-template <class T>
 struct sine_and_cosine {
-  T sine, cosine;
+  double sine, cosine;
 };
 
 /* Of |x| < 1e5 rad: reduced by multiples of π/2 in three parts, then Taylor's series. */
-inline sine_and_cosine<double> sine_cosine(double x) {
+inline sine_and_cosine sine_cosine(double x) {
   constexpr double shift = 6755399441055744.0;  // as above
   const double shifted = x * 0.63661977236758134308 + shift, k = shifted - shift;
   const double r =

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "description_error.h"
+#include "motion.h"
 
 namespace tendonfmu::plant {
 namespace {
@@ -292,7 +293,7 @@ int integrator::prepare(solver_number time, N_Vector state, N_Vector, SUNMatrix,
       const double* y = N_VGetArrayPointer(state);
       self->equations_.want_slopes(true);
       self->equations_.evaluate(time, y, &self->modes_, *self->inputs_, N_VGetArrayPointer(scratch));
-      self->linearisation_.take(self->equations_, y, *self->inputs_);
+      self->linearisation_.take(self->equations_.last(), y);
       self->work_.jacobians += 1;
     }
     *taken = old_will_do ? SUNFALSE : SUNTRUE;

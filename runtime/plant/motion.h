@@ -9,7 +9,7 @@ namespace tendonfmu::plant {
 /* Quintic Hermite interpolation, constant outside: continuous with two derivatives. */
 double at_time(const knots& knots, double time);
 
-/* Path of a tendon for one joint, ∫ r dq from 0, its moment arm and the arm's slope by the angle. */
+/* Path of a tendon for one joint, ∫ r dq from 0, and its moment arm. */
 inline double path_of(const moment_arm& arm, double angle) {
   double path = angle * (arm.mean + 0.5 * arm.slope * angle);
   if (arm.eccentricity != 0.0) {
@@ -24,14 +24,6 @@ inline double arm_at(const moment_arm& arm, double angle) {
     r += arm.eccentricity * sine(angle + arm.phase);
   }
   return r;
-}
-
-inline double arm_slope_at(const moment_arm& arm, double angle) {
-  double slope = arm.slope;
-  if (arm.eccentricity != 0.0) {
-    slope += arm.eccentricity * cosine(angle + arm.phase);
-  }
-  return slope;
 }
 
 /* Elongation (m) at which a tendon pulls with `force` (N), and back. */

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <type_traits>
 
+#include "bytes.h"
 #include "motion.h"
 
 namespace tendonfmu::plant {
@@ -21,7 +22,7 @@ tendonfmu_plant_settings settings_of(const rig& rig) {
   settings.relative_tolerance = rig.relative_tolerance;
   settings.scheduled_motion = settings.scheduled_pushes = settings.sensors = 1;
   settings.seed = rig.seed;
-  std::copy(rig.tip.begin(), rig.tip.end(), settings.push_point);
+  std::copy(rig.tip.data(), rig.tip.data() + 3, settings.push_point);
   settings.push_link = static_cast<int>(rig.joint_count());
   return settings;
 }
@@ -68,7 +69,7 @@ void plant::set_inputs(const tendonfmu_plant_inputs& inputs) {
     std::copy(inputs.tendon_position_command, inputs.tendon_position_command + m, next.command);
   }
   next.pretension = inputs.pretension;
-  std::copy(inputs.push_force, inputs.push_force + 3, next.push.force.begin());
+  std::copy(inputs.push_force, inputs.push_force + 3, next.push.force.data());
   const bool changed = next.given != inputs_.given || !std::equal(next.command, next.command + m, inputs_.command) ||
                        next.pretension != inputs_.pretension || next.push.force != inputs_.push.force;
   inputs_ = next;
@@ -88,7 +89,7 @@ void plant::make_integrator() {
   inputs_.scheduled_motion = settings_.scheduled_motion != 0;
   inputs_.scheduled_pushes = settings_.scheduled_pushes != 0;
   inputs_.push.link = static_cast<std::size_t>(settings_.push_link) - 1;
-  std::copy(settings_.push_point, settings_.push_point + 3, inputs_.push.point.begin());
+  std::copy(settings_.push_point, settings_.push_point + 3, inputs_.push.point.data());
 }
 
 void plant::reset() {
@@ -177,19 +178,12 @@ void plant::advance(double until) {
 
 namespace {
 
-constexpr std::uint64_t state_mark = 0x33746e616c704654;  // "TFplant3"
+constexpr std::uint64_t state_mark = 0x34746e616c704654;  // "TFplant4"
 constexpr double beyond_reason = 1e12;                    // of any number, in its unit
 constexpr double largest_motion = 1e5;                    // rad, m, and their speeds: where sine_cosine() ends
 
 std::uint64_t digest(const std::vector<double>& numbers) {
-  std::uint64_t hash = 0xcbf29ce484222325;
-  for (const double number : numbers) {
-    std::uint64_t bits;
-    std::memcpy(&bits, &number, sizeof bits);
-    hash = (hash ^ bits) * 0x100000001b3;
-    hash ^= hash >> 29;
-  }
-  return hash;
+  return hash_bytes(numbers.data(), sizeof(double) * numbers.size(), 0);
 }
 
 /* Before the numbers. Settings are compared: a state continues only as it began. */
@@ -369,11 +363,6 @@ void put(double* array, std::size_t row, const double* values, std::size_t count
   }
 }
 
-void put(double* array, std::size_t row, const vector3<double>& v) {
-  const double values[3] = {v.x, v.y, v.z};
-  put(array, row, values, 3);
-}
-
 }  // namespace
 
 void plant::write_signals(const tendonfmu_plant_signals& s, std::size_t row) const {
@@ -414,10 +403,10 @@ void plant::write_signals(const tendonfmu_plant_signals& s, std::size_t row) con
   put(s.measured_joint_velocity, row, shown[sensors::joint_velocity], n);
   put(s.measured_external_torque, row, shown[sensors::external_torque], n);
 
-  const vector3<double> tip = move_point(e.motion.links[n - 1], rig_.tip).place;
-  put(s.contact_force, row, e.contact.force);
-  put(s.contact_point, row, e.contact.largest > 0.0 ? e.contact.place : tip);
-  put(s.tip_position, row, tip);
+  const three tip = move_point(e.motion.links[n - 1], rig_.tip).place;
+  put(s.contact_force, row, e.contact.force.data(), 3);
+  put(s.contact_point, row, (e.contact.largest > 0.0 ? e.contact.place : tip).data(), 3);
+  put(s.tip_position, row, tip.data(), 3);
   put(s.friction_level, row, &e.level, 1);
   const double energy[6] = {kinetic_energy(rig_, e.motion), potential_energy(rig_, e, state, now_.modes),
                             state[at.motor_work()],         state[at.friction_work()],

@@ -1,6 +1,7 @@
 /* The numbers of a simulated finger, as read and checked: plain data in SI units, joints and tendons counted from 0. */
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -9,7 +10,7 @@
 
 namespace tendonfmu::plant {
 
-using three = std::array<double, 3>;
+using three = Eigen::Vector3d;
 
 constexpr std::size_t max_joints = 16, max_tendons = 64;
 
@@ -79,9 +80,8 @@ struct friction_settings {
 /* --- Bodies and tendons ---------------------------------------------------------------------------------------- */
 
 struct link {
-  three axis{}, offset{}, centre_of_mass{};
+  three axis = three::Zero(), offset = three::Zero(), centre_of_mass = three::Zero(), inertia = three::Zero();
   double mass = 0.0;
-  three inertia{};
   double lower = 0.0, upper = 0.0, stop_stiffness = 0.0, stop_damping = 0.0;
   double cover_stiffness = 0.0, cover_rest = 0.0, cover_hardening = 0.0;
   double damping = 0.0;
@@ -110,18 +110,18 @@ struct wrist {
 
 struct push {
   double start = 0.0, rise = 0.0, hold = 0.0, fall = 0.0, force = 0.0; /* s, N */
-  three direction{};                                                   /* unit */
+  three direction = three::Zero();                                     /* unit */
   bool in_link_frame = true;
   std::size_t link = 0;
-  three point{};
+  three point = three::Zero();
 };
 
 struct obstacle {
   bool present = false;
-  three centre{};
+  three centre = three::Zero();
   double radius = 0.0, stiffness = 0.0, damping = 0.0;
   std::size_t link = 0;
-  three point{};
+  three point = three::Zero();
 };
 
 /* --- Motion, sensors, integration ------------------------------------------------------------------------------ */
@@ -145,7 +145,7 @@ struct sensors {
 struct rig {
   std::string name;
   std::uint64_t seed = 0;
-  three gravity{}, tip{};
+  three gravity = three::Zero(), tip = three::Zero();
   std::vector<link> links;
   std::vector<double> coupling; /* [n-1] N·m/rad */
   std::vector<tendon> tendons;

@@ -137,7 +137,7 @@ void check_stiffness(const json_node& physics, const rig& rig) {
   const std::size_t n = rig.joint_count();
   double angle[max_joints], rest[max_joints] = {};
   desired_angles(rig, 0.0, angle);
-  chain_motion<double> motion;
+  chain_motion motion;
   move_chain(rig, angle, rest, &motion);
   double mass[max_joints * max_joints];
   mass_matrix(rig, motion, mass);

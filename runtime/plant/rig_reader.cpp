@@ -58,16 +58,12 @@ three three_in(const json_node& parent, const char* key, const range& allowed, s
 }
 
 three direction_in(const json_node& parent, const char* key) {
-  three direction = three_in(parent, key, {-1e6, 1e6, ""}, std::nullopt);
-  const double length =
-      std::sqrt(direction[0] * direction[0] + direction[1] * direction[1] + direction[2] * direction[2]);
+  const three direction = three_in(parent, key, {-1e6, 1e6, ""}, std::nullopt);
+  const double length = direction.norm();
   if (length < 1e-12) {
     parent.member(key).refuse("a direction [x, y, z] that is not zero");
   }
-  for (double& x : direction) {
-    x /= length;
-  }
-  return direction;
+  return direction / length;
 }
 
 std::size_t index_in(const json_node& parent, const char* key, std::size_t low, std::size_t high,
@@ -108,8 +104,7 @@ void read_inertia(const json_node& node, link* link) {
   link->inertia = three_in(node, "inertia", {0.0, 1e3, "kg m2", true}, std::nullopt);
   const three& i = link->inertia;
   // no body has a moment of inertia larger than the sum of the others
-  const double slack = 1e-9 * (i[0] + i[1] + i[2]);
-  if (i[0] > i[1] + i[2] + slack || i[1] > i[0] + i[2] + slack || i[2] > i[0] + i[1] + slack) {
+  if (2.0 * i.maxCoeff() > (1.0 + 1e-9) * i.sum()) {
     node.member("inertia").refuse("three moments of inertia none of which exceeds the sum of the two others");
   }
 }
@@ -141,9 +136,9 @@ void read_links(const json_node& finger, const json_node& physics, rig* rig) {
     node.expect_keys({"axis", "offset", "mass", "centre_of_mass", "inertia", "limits", "cover_hardening", "damping"});
     link& link = rig->links[j];
     link.axis = direction_in(node, "axis");
-    link.offset = three_in(node, "offset", any_length, three{});
+    link.offset = three_in(node, "offset", any_length, three::Zero());
     link.mass = number_in(node, "mass", {0.0, 1e3, "kg", true});
-    link.centre_of_mass = three_in(node, "centre_of_mass", any_length, three{});
+    link.centre_of_mass = three_in(node, "centre_of_mass", any_length, three::Zero());
     read_inertia(node, &link);
     read_limits(node, &link);
     link.cover_hardening = number_in(node, "cover_hardening", {0.0, 1e6, "N·m/rad3"}, 0.0);
@@ -154,7 +149,7 @@ void read_links(const json_node& finger, const json_node& physics, rig* rig) {
     }
   }
   rig->gravity = three_in(physics, "gravity", {-1e3, 1e3, "m/s2"}, three{0.0, 0.0, -9.81});
-  rig->tip = three_in(physics, "tip", any_length, three{});
+  rig->tip = three_in(physics, "tip", any_length, three::Zero());
   rig->coupling = numbers_in(physics, "joint_coupling", n - 1, {0.0, 1e6, "N·m/rad"});
   const json_node servo = physics.member("servo");
   servo.expect_keys_if_present({"frequency", "damping_ratio"});

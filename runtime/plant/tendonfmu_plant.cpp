@@ -6,6 +6,7 @@
 #include <new>
 #include <string>
 
+#include "bytes.h"
 #include "description_error.h"
 #include "motion.h"
 #include "plant.h"
@@ -20,14 +21,6 @@ struct tendonfmu_plant {
 namespace {
 
 using tendonfmu::plant::refusal;
-
-std::uint64_t identity_of(const char* text, std::size_t size) {
-  std::uint64_t hash = 0xcbf29ce484222325;
-  for (std::size_t i = 0; i < size; ++i) {
-    hash = (hash ^ static_cast<unsigned char>(text[i])) * 0x100000001b3;
-  }
-  return hash;
-}
 
 /* Without memory for the line there is none. */
 void note(const tendonfmu_plant* plant, const char* line) noexcept {
@@ -76,7 +69,7 @@ tendonfmu_plant* tendonfmu_plant_create(const char* rig_json, size_t size, char*
     if (!rig_json) {
       throw tendonfmu::description_error("rig: expected a text, not NULL");
     }
-    return new tendonfmu_plant(tendonfmu::plant::read_rig(rig_json, size), identity_of(rig_json, size));
+    return new tendonfmu_plant(tendonfmu::plant::read_rig(rig_json, size), hash_bytes(rig_json, size, 0));
   } catch (const std::bad_alloc&) {
     tendonfmu::copy_line("rig: out of memory", message, message_size);
   } catch (const std::exception& refused) {

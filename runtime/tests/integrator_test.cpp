@@ -124,7 +124,7 @@ TEST(Cvode, GivesUpInOneLineAndLeavesTheMomentAlone) {
   EXPECT_EQ(one.now.time, before.time);
   EXPECT_EQ(one.now.state, before.state);
   // and goes on afterwards
-  one.inputs.push.force = {};
+  one.inputs.push.force.setZero();
   one.advance(0.02);
   EXPECT_EQ(one.now.time, 0.02);
 }

@@ -6,6 +6,7 @@
 #include <functional>
 #include <limits>
 
+#include "bytes.h"
 #include "test_plant.h"
 
 namespace {
@@ -154,13 +155,7 @@ std::size_t number_count(const Bytes& state) {
 /* The state with another number, and the digest that belongs to it. */
 Bytes with_number(Bytes state, std::size_t index, double value) {
   std::memcpy(&state[header_bytes + index * sizeof value], &value, sizeof value);
-  std::uint64_t digest = 0xcbf29ce484222325;
-  for (std::size_t k = 0; k < number_count(state); ++k) {
-    std::uint64_t bits;
-    std::memcpy(&bits, &state[header_bytes + k * sizeof bits], sizeof bits);
-    digest = (digest ^ bits) * 0x100000001b3;
-    digest ^= digest >> 29;
-  }
+  const std::uint64_t digest = hash_bytes(&state[header_bytes], number_count(state) * sizeof value, 0);
   std::memcpy(&state[digest_at], &digest, sizeof digest);
   return state;
 }

@@ -1,4 +1,4 @@
-// Links of the simulated finger: mass matrix, inverse dynamics and Jacobian against energies and differences.
+// Links of the simulated finger: mass matrix and inverse dynamics against energies and differences.
 #include "rigid_body.h"
 
 #include <gtest/gtest.h>
@@ -22,8 +22,8 @@ struct RigidBody : testing::Test {
       speed[j] = rate(random);
     }
   }
-  chain_motion<double> moved() const {
-    chain_motion<double> motion;
+  chain_motion moved() const {
+    chain_motion motion;
     move_chain(small, q, speed, &motion);
     return motion;
   }
@@ -34,7 +34,7 @@ struct RigidBody : testing::Test {
       angle[j] = q[j] + t * (speed[j] + 0.5 * t * acceleration[j]);
       rate[j] = speed[j] + t * acceleration[j];
     }
-    chain_motion<double> motion;
+    chain_motion motion;
     move_chain(small, angle, rate, &motion);
     return kinetic_energy(small, motion) + gravity_energy(small, motion);
   }
@@ -43,7 +43,7 @@ struct RigidBody : testing::Test {
 TEST_F(RigidBody, KineticEnergyIsHalfOfSpeedMassSpeed) {
   for (int trial = 0; trial < 50; ++trial) {
     draw();
-    const chain_motion<double> motion = moved();
+    const chain_motion motion = moved();
     double mass[max_joints * max_joints], energy = 0.0;
     mass_matrix(small, motion, mass);
     for (std::size_t i = 0; i < n; ++i) {
