@@ -3,7 +3,8 @@
 1. A delay between forces and positions is scanned for: derivatives find a large one neither before nor after friction
    with a memory has been fitted to it.
 2. Torque that depends on the angles and not on the direction comes before friction, which takes it up otherwise.
-3. Friction with a memory is fitted, whether the description has it or not. What it lacked is a cause.
+3. Friction with a memory is fitted, whether the description has it or not. What it lacked is a cause. A described
+   memory stays where a cause beside it explains more than another memory: that would take the cause up.
 """
 
 from __future__ import annotations
@@ -125,6 +126,12 @@ def _found_base(
     described = extended_description(nominal.data, [term for terms in start for term in terms])
     start = [*_position_dependent(described, samples, least, least_gain), *start]
     model, memory = _with_memory(given, nominal, start, samples, settings)
+    if memory and memory_of(nominal.data):
+        own = _with_own_memory(nominal, start, samples, settings)
+        best = look(own.data, samples, least, model=own).as_described.selection.best(least_gain)
+        other = look(model.data, samples, least, (), model).as_described.selection.base
+        if best is not None and best.unseen.sum() < other.sum():
+            model, memory = own, []
     if positions.delay is None and (late := delay_of_torque(model, samples, least)):
         others = _with_memory(given, nominal, [*start, late], samples, settings)
         if others[0].cost < model.cost:
@@ -161,10 +168,24 @@ def _with_memory(
     given: Finger, nominal: FittedModel, start: Sequence[tuple[Term, ...]], samples: Samples, settings: FitSettings
 ) -> tuple[FittedModel, list[tuple[Term, ...]]]:
     """Return the model with the memory that recordings choose, and the terms of it that the description lacks."""
-    described = extended_description(nominal.data, [term for terms in start for term in terms])
-    is_held = nominal.fixed or any(term.fixed for terms in start for term in terms)
-    held = held_delay(described) if is_held else ()
+    described, held = _started(nominal, start)
     return remembering(replace(given, data=described), nominal, samples, settings, held)
+
+
+def _with_own_memory(
+    nominal: FittedModel, start: Sequence[tuple[Term, ...]], samples: Samples, settings: FitSettings
+) -> FittedModel:
+    """Return the model with the memory that the description has."""
+    described, held = _started(nominal, start)
+    return refitted(FittedModel(described, nominal.given, {}, fixed=held), samples, settings) if start else nominal
+
+
+def _started(nominal: FittedModel, start: Sequence[tuple[Term, ...]]) -> tuple[Data, tuple[str, ...]]:
+    """Return the description with the terms of the start, and what fits leave of it."""
+    terms = [term for each in start for term in each]
+    described = extended_description(nominal.data, terms)
+    is_held = nominal.fixed or any(term.fixed for term in terms)
+    return described, held_delay(described) if is_held else ()
 
 
 def remembering(
