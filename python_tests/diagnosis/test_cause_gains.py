@@ -55,6 +55,21 @@ def test_what_resembles_friction_removes_more_than_another_form_of_its_memory() 
     assert not search.lowers("gravity", before, np.where(np.arange(20) == 3, 0.0, before + 0.02)), "not certain"
 
 
+def test_the_last_check_counts_a_described_memory_too() -> None:
+    """Σ e² of models: 100 without memory, 40 as described, 10 with another memory, 9 with a cause beside it."""
+    left = {"plain": 100.0, "nominal": 40.0, "full": 9.0, "as described": 34.0, "without the cause": 10.0}
+    bench = whole._Bench.__new__(whole._Bench)
+    bench._unseen = cast("Any", SimpleNamespace(squares=lambda name: np.array([left[name]])))
+    models = {name: cast("Any", SimpleNamespace(data=name)) for name in left}
+    bench._plain, bench.nominal = models["plain"], models["nominal"]
+    causes = [Judged(Where(effect)) for effect in ("presliding", "load_friction")]
+    without = [models["as described"], models["without the cause"]]
+    shares = bench.shares_of_memory(causes, models["full"], without)
+    assert shares == pytest.approx([np.sqrt(25.0 / 85.0), np.sqrt(1.0 / 85.0)])
+    bench._plain = models["nominal"]
+    assert bench.shares_of_memory(causes[1:], models["full"], without[1:]) == [np.inf], "no memory at all"
+
+
 def test_only_laws_of_the_nominal_description_are_asked_about(monkeypatch: pytest.MonkeyPatch) -> None:
     """Joint 1 of the nominal finger has friction of its own; friction by the load is a cause of the extended one."""
     span = SimpleNamespace(speed=np.ones(2), tendon_speed=np.full((4, 2), 0.01))

@@ -221,6 +221,20 @@ def test_a_search_starts_with_the_memory_that_there_is() -> None:
     assert left[1] < 0.5 * left[0]
 
 
+def test_what_a_memory_explains_counts_from_friction_without_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A described memory of a wrong form explains most of it; beside it, another form explains little."""
+    made = recorded(finger() | {"extensions": [{"effect": "presliding", "displacement": 0.4}]}, 25, 3, 20.0, 0)
+    monkeypatch.setattr(ExtensionSearch, "_try_next", lambda *_: None)
+    explained = []
+    for rows in ([], [{"effect": "presliding", "displacement": 0.3}], [{"effect": "presliding", "stiffness": 3e3}]):
+        base = find_base(described(finger() | {"extensions": rows}), [made], FitSettings(threads=1), 0.03)
+        searched = ExtensionSearch(base, 0.03)
+        searched.run(lambda _: None)
+        explained.append(searched.of_memory)
+    assert explained[0] > 0.0
+    assert explained[1:] == pytest.approx([explained[0]] * 2, rel=0.1)
+
+
 def test_position_dependent_torque_comes_first(hidden: FitRecording) -> None:
     base = find_base(described(finger()), [hidden], FitSettings(threads=1), 0.03)
     first = base.start[0][0]

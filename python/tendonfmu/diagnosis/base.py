@@ -30,7 +30,7 @@ from tendonfmu.diagnosis.extension_fit import (
 from tendonfmu.diagnosis.samples import Samples
 from tendonfmu.diagnosis.selection import Judged, LeastSizes, least_sizes
 from tendonfmu.diagnosis.view import View, look
-from tendonfmu.estimate import choose_memory, held_delay
+from tendonfmu.estimate import choose_memory, held_delay, without_memory
 from tendonfmu.model import Finger
 from tendonfmu.recordings import FitRecording
 
@@ -44,6 +44,7 @@ class Base:
     samples: Samples
     least: LeastSizes  # sizes that the sensors can show
     nominal: FittedModel  # the given structure
+    plain: FittedModel  # without its memory
     start: tuple[tuple[Term, ...], ...]  # delay, position-dependent torque and memory that the description lacks
     model: FittedModel  # fitted with `start`
     settings: FitSettings
@@ -60,8 +61,8 @@ class Base:
     def without(self, out: Flags) -> Base:
         """Return the base fitted without some blocks [B]."""
         samples = self.samples.without(out)
-        nominal, model = (refitted(each, samples, self.settings) for each in (self.nominal, self.model))
-        return replace(self, samples=samples, nominal=nominal, model=model)
+        nominal, plain, model = all_refitted([self.nominal, self.plain, self.model], samples, self.settings)
+        return replace(self, samples=samples, nominal=nominal, plain=plain, model=model)
 
 
 def refitted(model: FittedModel, samples: Samples, settings: FitSettings, rough: bool = False) -> FittedModel:
@@ -69,6 +70,12 @@ def refitted(model: FittedModel, samples: Samples, settings: FitSettings, rough:
     return fit_numbers(
         model.data, samples.at_predicted_forces(model.data), settings, given=model.given, fixed=model.fixed, rough=rough
     )
+
+
+def all_refitted(models: Sequence[FittedModel], samples: Samples, settings: FitSettings) -> list[FittedModel]:
+    """Fit models again, and one that is there twice once."""
+    again = {key: refitted(model, samples, settings) for key, model in {id(each): each for each in models}.items()}
+    return [again[id(model)] for model in models]
 
 
 def find_base(
@@ -117,6 +124,7 @@ def _found_base(
     nominal = fit_numbers(given.data, samples, settings, fixed=held)
     samples = samples.as_rests_demand(nominal.data)
     nominal = refitted(nominal, samples, settings)
+    plain = _without_memory(nominal, samples, settings)
     least = least_sizes(given.data, recordings, float(np.median(np.diff(recordings[0].time))))
     late: tuple[Term, ...] = ()
     is_new = bool(DELAY.places(nominal.data, samples.recordings[0].kinematics))
@@ -136,7 +144,7 @@ def _found_base(
         others = _with_memory(given, nominal, [*start, late], samples, settings)
         if others[0].cost < model.cost:
             (model, memory), start = others, [*start, late]
-    return Base(samples, least, nominal, (*start, *memory), model, settings, positions)
+    return Base(samples, least, nominal, plain, (*start, *memory), model, settings, positions)
 
 
 def _with_shown_delay(given: Finger, positions: Positions) -> tuple[Finger, tuple[str, ...]]:
@@ -170,6 +178,14 @@ def _with_memory(
     """Return the model with the memory that recordings choose, and the terms of it that the description lacks."""
     described, held = _started(nominal, start)
     return remembering(replace(given, data=described), nominal, samples, settings, held)
+
+
+def _without_memory(nominal: FittedModel, samples: Samples, settings: FitSettings) -> FittedModel:
+    """Return the model without the memory that the description has."""
+    if not memory_of(nominal.data):
+        return nominal
+    bare, given = without_memory(nominal.data), without_memory(nominal.given)
+    return refitted(FittedModel(bare, given, {}, fixed=held_delay(bare) if nominal.fixed else ()), samples, settings)
 
 
 def _with_own_memory(

@@ -11,7 +11,7 @@ import numpy as np
 
 from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.answer import Asked, Compared, answered, cause_of, not_taken, reported
-from tendonfmu.diagnosis.base import Base, refitted
+from tendonfmu.diagnosis.base import Base, all_refitted
 from tendonfmu.diagnosis.contact_scan import detection_gain, event_gain, events_of, without_events
 from tendonfmu.diagnosis.delay import DELAY
 from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION, Place, Term, Where
@@ -90,13 +90,12 @@ class _Bench:
     ) -> None:
         base = found.base
         self._found, self._settings, self._seed, self._data = found, base.settings, seed, (training, tests)
-        self._full, self.nominal, self._samples = found.model, base.nominal, base.samples
+        self._full, self.nominal, self._plain, self._samples = found.model, base.nominal, base.plain, base.samples
         if not tests:  # exclude the judged samples from the fits
             self._samples = Samples.of(self.nominal.data, training, self._settings.threads)
             self._samples = replace(self._samples, drift=self._samples.as_rests_demand(self.nominal.data).drift)
-            self._full, self.nominal = (
-                refitted(model, self._samples, self._settings) for model in (self._full, self.nominal)
-            )
+            models = [self._full, self.nominal, self._plain]
+            self._full, self.nominal, self._plain = all_refitted(models, self._samples, self._settings)
         self._judged = [(each, each.tracked) for each in tests] or [(each, each.held_out) for each in training]
         self._unseen = Unseen(self.nominal.data, training, tests, self._settings.threads)
         self._predicted = self._samples.at_predicted_forces(self._full.data)
@@ -161,8 +160,10 @@ class _Bench:
         """Return the rms that each cause explains over that which the memory of friction explains; inf without one."""
         after = float(self._unseen.squares(fit.data).sum())
         explained = [max(float(self._unseen.squares(model.data).sum()) - after, 0.0) for model in without]
-        of_memory = sum(own for own, cause in zip(explained, causes, strict=True) if cause.effect == PRESLIDING)
-        return [float(np.sqrt(own / of_memory)) if of_memory else np.inf for own in explained]
+        described = (self._unseen.squares(model.data).sum() for model in (self._plain, self.nominal))
+        of_memory = float(np.subtract(*described))
+        of_memory += sum(own for own, cause in zip(explained, causes, strict=True) if cause.effect == PRESLIDING)
+        return [float(np.sqrt(own / of_memory)) if of_memory > 0.0 else np.inf for own in explained]
 
     def _is_of_positions(self, cause: Judged) -> bool:
         """Return whether a cause is a delay that positions show."""

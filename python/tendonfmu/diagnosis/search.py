@@ -234,7 +234,7 @@ class ExtensionSearch(CauseSearch):
     """Adds cause after cause to a base, and keeps the model with all of them."""
 
     events: tuple[Event, ...] = ()  # contact and stalls, which the samples of the base lack
-    of_memory = 0.0  # (N·m)² on unseen stretches that a new memory explains
+    of_memory = 0.0  # (N·m)² on unseen stretches that the memory explains
 
     def __init__(self, base: Base, least_gain: float) -> None:
         super().__init__(MOST_CAUSES + len(base.start))
@@ -245,9 +245,8 @@ class ExtensionSearch(CauseSearch):
 
     def run(self, step: Step) -> None:
         self.view = self.base.look(self.model)
-        learned = any(cause.effect == PRESLIDING for cause in self.causes)
-        left = (view.selection.base.sum() for view in (self.first, self.view))
-        self.of_memory = float(np.subtract(*left)) if learned else 0.0
+        after = self.view if any(cause.effect == PRESLIDING for cause in self.causes) else self.first
+        self.of_memory = float(self.base.left_unseen(self.base.plain).sum() - after.selection.base.sum())
         super().run(step)
 
     def _try_next(self, tried: set[str]) -> tuple[Judged, bool] | None:
