@@ -55,19 +55,18 @@ def test_what_resembles_friction_removes_more_than_another_form_of_its_memory() 
     assert not search.lowers("gravity", before, np.where(np.arange(20) == 3, 0.0, before + 0.02)), "not certain"
 
 
-def test_the_last_check_counts_a_described_memory_too() -> None:
-    """Σ e² of models: 100 without memory, 40 as described, 10 with another memory, 9 with a cause beside it."""
-    left = {"plain": 100.0, "nominal": 40.0, "full": 9.0, "as described": 34.0, "without the cause": 10.0}
+def test_the_last_check_compares_with_all_that_the_memory_explains(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Σ e² of models: 100 without memory, 34 as described, 10 without a cause, 9 with everything."""
+    left = {"plain": 100.0, "full": 9.0, "as described": 34.0, "without the cause": 10.0}
+    models = {name: cast("Any", SimpleNamespace(data=name)) for name in left}
     bench = whole._Bench.__new__(whole._Bench)
     bench._unseen = cast("Any", SimpleNamespace(squares=lambda name: np.array([left[name]])))
-    models = {name: cast("Any", SimpleNamespace(data=name)) for name in left}
-    bench._plain, bench.nominal = models["plain"], models["nominal"]
-    causes = [Judged(Where(effect)) for effect in ("presliding", "load_friction")]
+    bench._full, bench._samples, bench._settings = models["full"], cast("Any", None), cast("Any", None)
+    monkeypatch.setattr(whole, "forgetful", lambda model, *_: models["plain"])
     without = [models["as described"], models["without the cause"]]
-    shares = bench.shares_of_memory(causes, models["full"], without)
-    assert shares == pytest.approx([np.sqrt(25.0 / 85.0), np.sqrt(1.0 / 85.0)])
-    bench._plain = models["nominal"]
-    assert bench.shares_of_memory(causes[1:], models["full"], without[1:]) == [np.inf], "no memory at all"
+    assert bench.shares_of_memory(models["full"], without) == pytest.approx(np.sqrt([25.0 / 91.0, 1.0 / 91.0]))
+    bench.of_memory = 0.0
+    assert bench.shares_of_memory(models["full"], without) == [np.inf, np.inf], "no memory"
 
 
 def test_only_laws_of_the_nominal_description_are_asked_about(monkeypatch: pytest.MonkeyPatch) -> None:

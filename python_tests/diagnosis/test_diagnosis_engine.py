@@ -223,16 +223,21 @@ def test_a_search_starts_with_the_memory_that_there_is() -> None:
 
 def test_what_a_memory_explains_counts_from_friction_without_one(monkeypatch: pytest.MonkeyPatch) -> None:
     """A described memory of a wrong form explains most of it; beside it, another form explains little."""
-    made = recorded(finger() | {"extensions": [{"effect": "presliding", "displacement": 0.4}]}, 25, 3, 20.0, 0)
+    remembering = {"extensions": [{"effect": "presliding", "displacement": 0.4}]}
     monkeypatch.setattr(ExtensionSearch, "_try_next", lambda *_: None)
-    explained = []
-    for rows in ([], [{"effect": "presliding", "displacement": 0.3}], [{"effect": "presliding", "stiffness": 3e3}]):
+
+    def explained(truth: Mapping[str, Any], *rows: Mapping[str, Any]) -> float:
+        made = recorded({**truth, **remembering}, 25, 3, 20.0, 0)
         base = find_base(described(finger() | {"extensions": rows}), [made], FitSettings(threads=1), 0.03)
         searched = ExtensionSearch(base, 0.03)
         searched.run(lambda _: None)
-        explained.append(searched.of_memory)
-    assert explained[0] > 0.0
-    assert explained[1:] == pytest.approx([explained[0]] * 2, rel=0.1)
+        return searched.of_memory
+
+    alone = explained(finger())
+    assert alone > 0.0
+    for row in ({"displacement": 0.3}, {"stiffness": 3e3}):
+        assert explained(finger(), {"effect": "presliding", **row}) == pytest.approx(alone, rel=0.1)
+    assert explained(with_cover()) == pytest.approx(alone, rel=0.1), "a missing cover is no memory"
 
 
 def test_position_dependent_torque_comes_first(hidden: FitRecording) -> None:

@@ -1,6 +1,6 @@
 /* Moves the finger through time with CVODE (A. C. Hindmarsh et al., "SUNDIALS: Suite of nonlinear and
- * differential/algebraic equation solvers", ACM TOMS 31(3), 2005): backward differentiation formulas with the analytic
- * Jacobian, kinks found as roots. */
+ * differential/algebraic equation solvers", ACM TOMS 31(3), 2005): backward differentiation formulas, Newton's
+ * matrix from the stiff part of the Jacobian, kinks found as roots. */
 #pragma once
 
 #include <nvector/nvector_serial.h>

@@ -44,7 +44,6 @@ class Base:
     samples: Samples
     least: LeastSizes  # sizes that the sensors can show
     nominal: FittedModel  # the given structure
-    plain: FittedModel  # without its memory
     start: tuple[tuple[Term, ...], ...]  # delay, position-dependent torque and memory that the description lacks
     model: FittedModel  # fitted with `start`
     settings: FitSettings
@@ -61,8 +60,8 @@ class Base:
     def without(self, out: Flags) -> Base:
         """Return the base fitted without some blocks [B]."""
         samples = self.samples.without(out)
-        nominal, plain, model = all_refitted([self.nominal, self.plain, self.model], samples, self.settings)
-        return replace(self, samples=samples, nominal=nominal, plain=plain, model=model)
+        nominal, model = (refitted(each, samples, self.settings) for each in (self.nominal, self.model))
+        return replace(self, samples=samples, nominal=nominal, model=model)
 
 
 def refitted(model: FittedModel, samples: Samples, settings: FitSettings, rough: bool = False) -> FittedModel:
@@ -72,10 +71,12 @@ def refitted(model: FittedModel, samples: Samples, settings: FitSettings, rough:
     )
 
 
-def all_refitted(models: Sequence[FittedModel], samples: Samples, settings: FitSettings) -> list[FittedModel]:
-    """Fit models again, and one that is there twice once."""
-    again = {key: refitted(model, samples, settings) for key, model in {id(each): each for each in models}.items()}
-    return [again[id(model)] for model in models]
+def forgetful(model: FittedModel, samples: Samples, settings: FitSettings) -> FittedModel:
+    """Fit a model again without its memory."""
+    if not memory_of(model.data):
+        return model
+    bare, given = without_memory(model.data), without_memory(model.given)
+    return refitted(FittedModel(bare, given, {}, fixed=held_delay(bare) if model.fixed else ()), samples, settings)
 
 
 def find_base(
@@ -124,7 +125,6 @@ def _found_base(
     nominal = fit_numbers(given.data, samples, settings, fixed=held)
     samples = samples.as_rests_demand(nominal.data)
     nominal = refitted(nominal, samples, settings)
-    plain = _without_memory(nominal, samples, settings)
     least = least_sizes(given.data, recordings, float(np.median(np.diff(recordings[0].time))))
     late: tuple[Term, ...] = ()
     is_new = bool(DELAY.places(nominal.data, samples.recordings[0].kinematics))
@@ -134,17 +134,19 @@ def _found_base(
     described = extended_description(nominal.data, [term for terms in start for term in terms])
     start = [*_position_dependent(described, samples, least, least_gain), *start]
     model, memory = _with_memory(given, nominal, start, samples, settings)
+    remember = _with_memory
     if memory and memory_of(nominal.data):
-        own = _with_own_memory(nominal, start, samples, settings)
-        best = look(own.data, samples, least, model=own).as_described.selection.best(least_gain)
+        own = _with_own_memory(given, nominal, start, samples, settings)
+        answered = {DELAY.name} if positions.delay is not None else ()
+        best = look(own[0].data, samples, least, model=own[0]).as_described.selection.best(least_gain, answered)
         other = look(model.data, samples, least, (), model).as_described.selection.base
         if best is not None and best.unseen.sum() < other.sum():
-            model, memory = own, []
+            (model, memory), remember = own, _with_own_memory
     if positions.delay is None and (late := delay_of_torque(model, samples, least)):
-        others = _with_memory(given, nominal, [*start, late], samples, settings)
+        others = remember(given, nominal, [*start, late], samples, settings)
         if others[0].cost < model.cost:
             (model, memory), start = others, [*start, late]
-    return Base(samples, least, nominal, plain, (*start, *memory), model, settings, positions)
+    return Base(samples, least, nominal, (*start, *memory), model, settings, positions)
 
 
 def _with_shown_delay(given: Finger, positions: Positions) -> tuple[Finger, tuple[str, ...]]:
@@ -180,20 +182,12 @@ def _with_memory(
     return remembering(replace(given, data=described), nominal, samples, settings, held)
 
 
-def _without_memory(nominal: FittedModel, samples: Samples, settings: FitSettings) -> FittedModel:
-    """Return the model without the memory that the description has."""
-    if not memory_of(nominal.data):
-        return nominal
-    bare, given = without_memory(nominal.data), without_memory(nominal.given)
-    return refitted(FittedModel(bare, given, {}, fixed=held_delay(bare) if nominal.fixed else ()), samples, settings)
-
-
 def _with_own_memory(
-    nominal: FittedModel, start: Sequence[tuple[Term, ...]], samples: Samples, settings: FitSettings
-) -> FittedModel:
-    """Return the model with the memory that the description has."""
+    given: Finger, nominal: FittedModel, start: Sequence[tuple[Term, ...]], samples: Samples, settings: FitSettings
+) -> tuple[FittedModel, list[tuple[Term, ...]]]:
+    """Return the model with the memory that the description has, which lacks nothing of it."""
     described, held = _started(nominal, start)
-    return refitted(FittedModel(described, nominal.given, {}, fixed=held), samples, settings) if start else nominal
+    return refitted(FittedModel(described, given.data, {}, fixed=held), samples, settings) if start else nominal, []
 
 
 def _started(nominal: FittedModel, start: Sequence[tuple[Term, ...]]) -> tuple[Data, tuple[str, ...]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -84,24 +84,20 @@ class Positions:
 
     def _squares(self, recording: FitRecording, chosen: Flags, delays: Numbers) -> Numbers:
         """Return by block of the chosen samples the sum of squares that the equation leaves (m²) [K, delays]."""
-        index = blocks_of(recording.time, chosen)
-        squares = np.zeros((len(delays), len(recording.time)))
-        for part, left in self._left(recording, delays):
-            for whole, own in zip(squares, left, strict=True):
-                whole[part] = (own**2).sum(axis=1)
-        return np.column_stack([index.sums(each) for each in squares])
-
-    def _left(self, recording: FitRecording, delays: Numbers) -> Iterator[tuple[slice, Iterator[Numbers]]]:
-        """Yield each part, and what the equation leaves of it with each delay, less its mean (m)."""
-        groups = recording.recording.groups
+        groups, index = recording.recording.groups, blocks_of(recording.time, chosen)
         position = groups["tendon_position"] - (groups["joint_position"] @ self._arms.T if self._measured else 0.0)
         linear = with_linear_springs(self._finger, recording.recording).groups["tendon_position"]
         stretch = groups["tendon_force"] / self._stiffness + (groups["tendon_position"] - linear)
-        for part in recording.parts:
-            own = recording.time[part], position[part], stretch[part]
-            yield part, (self._apart_at(*own, delay) for delay in delays.tolist())
+        sums, squares = [], np.zeros(len(recording.time))
+        for delay in delays.tolist():
+            for part in recording.parts:
+                left = self._left(recording.time[part], position[part], stretch[part], delay)
+                squares[part] = (left**2).sum(axis=1)
+            sums.append(index.sums(squares))
+        return np.column_stack(sums)
 
-    def _apart_at(self, time: Numbers, position: Numbers, stretch: Numbers, delay: float) -> Numbers:
+    def _left(self, time: Numbers, position: Numbers, stretch: Numbers, delay: float) -> Numbers:
+        """Return what the equation leaves of a part with a delay, less its mean (m)."""
         late = [np.interp(time - delay, time, column) for column in position.T]
         left = (np.stack(late, axis=1) - stretch) @ self._apart
         return np.asarray(left - left.mean(axis=0))

@@ -11,13 +11,12 @@ import numpy as np
 
 from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.answer import Asked, Compared, answered, cause_of, not_taken, reported
-from tendonfmu.diagnosis.base import Base, all_refitted
+from tendonfmu.diagnosis.base import Base, forgetful, refitted
 from tendonfmu.diagnosis.contact_scan import detection_gain, event_gain, events_of, without_events
 from tendonfmu.diagnosis.delay import DELAY
 from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION, Place, Term, Where
 from tendonfmu.diagnosis.effects.places import law_of, thresholds
 from tendonfmu.diagnosis.extension_fit import (
-    PRESLIDING,
     FittedModel,
     cause_parameters,
     fit_extended,
@@ -90,12 +89,13 @@ class _Bench:
     ) -> None:
         base = found.base
         self._found, self._settings, self._seed, self._data = found, base.settings, seed, (training, tests)
-        self._full, self.nominal, self._plain, self._samples = found.model, base.nominal, base.plain, base.samples
+        self._full, self.nominal, self._samples = found.model, base.nominal, base.samples
         if not tests:  # exclude the judged samples from the fits
             self._samples = Samples.of(self.nominal.data, training, self._settings.threads)
             self._samples = replace(self._samples, drift=self._samples.as_rests_demand(self.nominal.data).drift)
-            models = [self._full, self.nominal, self._plain]
-            self._full, self.nominal, self._plain = all_refitted(models, self._samples, self._settings)
+            self._full, self.nominal = (
+                refitted(model, self._samples, self._settings) for model in (self._full, self.nominal)
+            )
         self._judged = [(each, each.tracked) for each in tests] or [(each, each.held_out) for each in training]
         self._unseen = Unseen(self.nominal.data, training, tests, self._settings.threads)
         self._predicted = self._samples.at_predicted_forces(self._full.data)
@@ -108,7 +108,7 @@ class _Bench:
         def judge(causes: list[Judged]) -> tuple[list[Judged], list[int]]:
             fit, without = self.fit(causes), self.each_without(causes)
             judged = [self.with_gain(cause, model, fit) for cause, model in zip(causes, without, strict=True)]
-            needed, shares = names_needed(judged), self.shares_of_memory(causes, fit, without)
+            needed, shares = names_needed(judged), self.shares_of_memory(fit, without)
             weak = [
                 k
                 for k, cause in enumerate(judged)
@@ -154,16 +154,17 @@ class _Bench:
         """Return, for each cause, the fit that lacks it."""
         return [self.fit([*causes[:k], *causes[k + 1 :]]) for k in range(len(causes))]
 
-    def shares_of_memory(
-        self, causes: Sequence[Judged], fit: FittedModel, without: Sequence[FittedModel]
-    ) -> list[float]:
-        """Return the rms that each cause explains over that which the memory of friction explains; inf without one."""
+    @cached_property
+    def of_memory(self) -> float:
+        """Σ e² on unseen data that the memory of friction explains beside all causes, (N·m)²."""
+        plain = forgetful(self._full, self._samples, self._settings)
+        return float(np.subtract(*(self._unseen.squares(model.data).sum() for model in (plain, self._full))))
+
+    def shares_of_memory(self, fit: FittedModel, without: Sequence[FittedModel]) -> list[float]:
+        """Return the rms that each cause explains over that which the memory explains; inf without one."""
         after = float(self._unseen.squares(fit.data).sum())
         explained = [max(float(self._unseen.squares(model.data).sum()) - after, 0.0) for model in without]
-        described = (self._unseen.squares(model.data).sum() for model in (self._plain, self.nominal))
-        of_memory = float(np.subtract(*described))
-        of_memory += sum(own for own, cause in zip(explained, causes, strict=True) if cause.effect == PRESLIDING)
-        return [float(np.sqrt(own / of_memory)) if of_memory > 0.0 else np.inf for own in explained]
+        return [float(np.sqrt(own / self.of_memory)) if self.of_memory > 0.0 else np.inf for own in explained]
 
     def _is_of_positions(self, cause: Judged) -> bool:
         """Return whether a cause is a delay that positions show."""

@@ -24,13 +24,12 @@ from typing import Any
 import numpy as np
 
 from tendonfmu.arrays import Numbers
-from tendonfmu.diagnosis.base import POSITION, Base, refitted, remembering
+from tendonfmu.diagnosis.base import POSITION, Base, forgetful, refitted, remembering
 from tendonfmu.diagnosis.candidate_columns import EVERYWHERE, Candidate, Proposal
 from tendonfmu.diagnosis.contact_scan import events_of
 from tendonfmu.diagnosis.delay import DELAY
 from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION, OF_LAW, Place, Term, Where
 from tendonfmu.diagnosis.extension_fit import (
-    PRESLIDING,
     REMEMBERING,
     FittedModel,
     extended_description,
@@ -217,7 +216,7 @@ MOST_FITTED = 3  # effects that columns cannot distinguish
 NEARLY = 0.8  # of the gain of a single sensor: prior knowledge always takes a part from several together
 # Of the rms that a memory explains: another form of it explains so much more. What depends on the same motions and
 # loads as friction, or scales the torque, resembles that.
-FORM = 0.07
+FORM = 0.09
 LIKE_A_LAW = {*OF_LAW, *SCALING}
 
 
@@ -245,8 +244,8 @@ class ExtensionSearch(CauseSearch):
 
     def run(self, step: Step) -> None:
         self.view = self.base.look(self.model)
-        after = self.view if any(cause.effect == PRESLIDING for cause in self.causes) else self.first
-        self.of_memory = float(self.base.left_unseen(self.base.plain).sum() - after.selection.base.sum())
+        plain = forgetful(self.model, self.base.samples, self.base.settings)
+        self.of_memory = float(self.base.left_unseen(plain).sum() - self.view.selection.base.sum())
         super().run(step)
 
     def _try_next(self, tried: set[str]) -> tuple[Judged, bool] | None:
@@ -328,8 +327,10 @@ class ExtensionSearch(CauseSearch):
             return model
         described = Finger(base.settings.path, model.data)
         other, memory = remembering(described, base.nominal, base.samples, base.settings, base.model.fixed)
-        if base.left_unseen(other).sum() >= base.left_unseen(model).sum():
+        explained = base.left_unseen(model).sum() - base.left_unseen(other).sum()
+        if explained <= 0.0:
             return model
+        self.of_memory += float(explained)
         self.causes = [cause for cause in self.causes if cause.effect not in REMEMBERING]
         self.causes += [_of_start(terms) for terms in memory]
         return other

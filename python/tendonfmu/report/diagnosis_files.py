@@ -1,4 +1,4 @@
-"""Which files a diagnosis writes, and its report. The output folder gets all of them, or stays as it was.
+"""Which files a diagnosis writes, and its report. A full disk leaves the output folder as it was.
 
 The report is "tendonfmu-diagnosis-1" of docs/reference/commands/diagnose.md.
 """
