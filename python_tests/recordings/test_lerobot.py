@@ -288,7 +288,10 @@ def test_bad_usage(call: Call, tmp_path: Path) -> None:
         ([*convert, "--finger", "f.json"], ["--finger", "not an option"]),
         ([*convert, "--radius", "1"], ["--radius", "not an option"]),
         (["table", *convert[1:], "--episodes", "1"], ["--episodes", "not an option"]),
-        (["emps", "log.csv", "-o", "r.csv", "--episodes", "1"], ["--episodes", "not an option"]),
+        (
+            ["emps", "log.csv", "-o", "r.csv", "--map", "m.json", "--episodes", "1"],
+            ["--map", "not an option", "convert table, convert lerobot and convert inspect; expected --mass"],
+        ),
         ([*convert, "--episodes", "3-1"], ["--episodes = '3-1'", "0-9,12"]),
         ([*convert, "--episodes", ""], ["--episodes = ''", "0-9,12"]),
         ([*convert, "--episodes", "2-5"], ["2-5", "episodes 0 to 4"]),

@@ -118,9 +118,12 @@ def convert_files(
     if source not in TAKEN:
         raise InputError(f"convert: unknown format {source!r}; expected one of {', '.join(TAKEN)}")
     given = {name.rstrip("_"): value for name, value in vars(options).items() if value is not None}
-    for name in given.keys() - TAKEN[source]:
+    for name in (each for each in given if each not in TAKEN[source]):
         expected = " or ".join(f"--{each}" for each in TAKEN[source])
-        raise InputError(f"convert {source}: --{name}: not an option of this format; expected {expected}")
+        others = files.listed([f"convert {other}" for other, taken in TAKEN.items() if name in taken])
+        raise InputError(
+            f"convert {source}: --{name}: not an option of this format, but of {others}; expected {expected}"
+        )
     if source == INSPECT:
         report = _inspect(file, output, options.map_, options.episodes)
     elif output is None:
