@@ -240,6 +240,19 @@ def test_what_a_memory_explains_counts_from_friction_without_one(monkeypatch: py
     assert explained(with_cover()) == pytest.approx(alone, rel=0.1), "a missing cover is no memory"
 
 
+@pytest.mark.parametrize("is_hidden", [False, True])
+def test_a_described_memory_stays_where_a_cause_explains_more(is_hidden: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The other memory is the described one under another name, which explains no more."""
+    given = finger() | {"extensions": [{"effect": "presliding", "displacement": 0.4}]}
+    truth = copy.deepcopy(given)
+    if is_hidden:
+        truth["joints"][0]["friction"]["static"] = 0.03
+    other = ((Term(by_name("presliding"), Place(), {}),),)
+    monkeypatch.setattr(base_module, "remembering", lambda described, nominal, *_: (nominal, list(other)))
+    base = find_base(described(given), [recorded(truth, 25, 3, 20.0)], FitSettings(threads=1), 0.03)
+    assert base.start == (() if is_hidden else other)
+
+
 def test_position_dependent_torque_comes_first(hidden: FitRecording) -> None:
     base = find_base(described(finger()), [hidden], FitSettings(threads=1), 0.03)
     first = base.start[0][0]
