@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import re
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -194,6 +195,27 @@ def test_the_angles_known_best(noise: float, stretch: float, source: str) -> Non
     away = best - angle
     assert (away - away.mean(axis=0)).std() < 1.1 * min(noise, 1e-2)
     assert found.recordings[0].kinematics == 2
+
+
+@pytest.mark.parametrize(("noise", "says"), [(1e-5, True), (3e-3, False)])
+def test_a_fit_says_what_quieter_encoders_would_leave(noise: float, says: bool) -> None:
+    """Tendon positions of 15 µm of noise make friction that remembers noisy; the encoders' noise is in rad."""
+    made, rng = recording(RELATIVE), np.random.default_rng(3)
+    groups = {name: values for name, values in made.groups.items() if name != "joint_velocity"}
+    groups["tendon_position"] = groups["tendon_position"] + 1.5e-5 * rng.standard_normal((len(made.time), 4))
+    groups["joint_position"] = groups["joint_position"] + noise * rng.standard_normal((len(made.time), 2))
+    noisy = Recording(made.path, made.time, groups)
+    given = finger({**RELATIVE, "displacement": 1.0}, start=True)
+    fit = FrictionFit(given, share=["tendons"], kinematics=1).fit(noisy)
+    advice = [sentence for sentence in fit.warnings_ if "--kinematics 2" in sentence]
+    assert bool(advice) == says
+    if says:
+        by_encoders = FrictionFit(given, share=["tendons"], kinematics=2).fit(noisy)
+        assert not any("--kinematics 2" in sentence for sentence in by_encoders.warnings_)
+        left = [np.linalg.norm(each.report_["memory"]["left_delivered"]) for each in (by_encoders, fit)]
+        assert left[0] < left[1] / 1.5
+        promised = np.array(re.findall(r"([\d.]+), ([\d.]+) mN·m would", advice[0])[0], dtype=float)
+        assert np.linalg.norm(promised) < 1.3e3 * left[0]  # no fewer than --kinematics 2 does leave, and little more
 
 
 # --- covariance

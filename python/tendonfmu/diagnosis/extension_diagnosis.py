@@ -11,7 +11,7 @@ import numpy as np
 
 from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.answer import Asked, Compared, answered, cause_of, not_taken, reported
-from tendonfmu.diagnosis.base import Base, forgetful, refitted
+from tendonfmu.diagnosis.base import Base, forgetful, refitted, remembering
 from tendonfmu.diagnosis.contact_scan import detection_gain, event_gain, events_of, without_events
 from tendonfmu.diagnosis.delay import DELAY
 from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION, Place, Term, Where
@@ -21,6 +21,7 @@ from tendonfmu.diagnosis.extension_fit import (
     cause_parameters,
     fit_extended,
     intervals_of,
+    memory_of,
     with_known,
 )
 from tendonfmu.diagnosis.gain import Gain, Unseen, measure_gain
@@ -31,8 +32,9 @@ from tendonfmu.diagnosis.result import Cause, CausePlace, Diagnosis, Invisible, 
 from tendonfmu.diagnosis.samples import Samples, Span, as_described, span_of
 from tendonfmu.diagnosis.search import FORM, LIKE_A_LAW, ExtensionSearch, calibrated, search, terms_of
 from tendonfmu.diagnosis.selection import SIGNIFICANCE, Judged, confirmed, invisible_effects, names_needed, step_p_value
+from tendonfmu.estimate import encoder_advice
 from tendonfmu.model import extended_row
-from tendonfmu.recordings import FitRecording
+from tendonfmu.recordings import FitRecording, on_encoders
 from tendonfmu.statistics import Interval
 
 # --- gains on unseen data ---------------------------------------------------------------------------------------------
@@ -231,7 +233,7 @@ class Lacks:
             (self._series, before, left),
             causes=[self._cause(k, verified, left) for k in range(len(verified.causes))],
             unexplained=unexplained,
-            warnings=self._warnings(),
+            warnings=[*self._warnings(), *self._encoder_advice(gain.extended.test_rms)],
             load_at_joints=samples.grid.means([recording.target for recording in samples.recordings]),
             noise_floor=tuple(float(value) for value in floor),
             floor_source="the part of the error on unseen stretches that nothing recorded predicts",
@@ -264,6 +266,20 @@ class Lacks:
                 f"only {2 * folds.stretches} s of motion: a cause must be larger to be certain; record a minute or more"
             )
         return warnings
+
+    def _encoder_advice(self, left: Sequence[float]) -> list[str]:
+        """Return a sentence if joint encoders leave far less of unseen motion; left: rms with tendon positions [n]."""
+        given, base, model = self._given, self._searched.base, self._searched.model
+        measured = on_encoders(base.nominal.data, [*given.training, *given.tests])
+        if not (measured and memory_of(model.data)):
+            return []
+        training, tests = measured[: len(given.training)], measured[len(given.training) :]
+        samples = Samples.of(model.data, training, base.settings.threads).as_rests_demand(model.data)
+        # another form of the memory may show in quieter angles
+        described = given.finger.with_data(model.data)
+        fitted, _ = remembering(described, base.nominal, samples, base.settings, model.fixed)
+        by_encoders = Unseen(base.nominal.data, training, tests, base.settings.threads).rms(fitted.data)
+        return encoder_advice(np.array(by_encoders), np.array(left))
 
     # --- gain ---
 

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
         unknown_names,
     )
     from .memory import has_memory, without_memory
-    from .memory_choice import choose_memory
+    from .memory_choice import choose_memory, encoder_advice
     from .memory_fit import MemoryProblem, minimise
     from .memory_methods import guess_prior
     from .methods import learn_batch

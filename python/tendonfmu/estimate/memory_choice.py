@@ -35,7 +35,7 @@ from tendonfmu.estimate.memory_methods import STEP, coarse_problem, from_starts,
 from tendonfmu.estimate.methods import learn_batch
 from tendonfmu.estimate.structure import Choice, Structure, build_structure, with_values
 from tendonfmu.model import Finger, effects, moment_arms, number_of
-from tendonfmu.recordings import FitRecording, best_angles, make_grid
+from tendonfmu.recordings import FitRecording, best_angles, make_grid, on_encoders
 
 Rows = tuple[dict[str, Any], ...]
 
@@ -271,7 +271,7 @@ def _mean_square_arm(data: Data, joint: int) -> float:
 # 1. The angles are those known best (`best_angles`), whatever source the finger will run on.
 # 2. What of the memory the motion does not show is left out: a relaxation time, or cords that stretch.
 # 3. If the delivered source leaves far more than the best angles, the numbers are fitted to it, too, and the better
-#    stay.
+#    stay. Then the user should know what the joint encoders would leave.
 
 
 MUCH = 1.5  # times what the best angles leave
@@ -288,6 +288,7 @@ class Remembered:
     left: Numbers  # [n] rms without a learning bias with these angles, and by the delivered source (N·m)
     left_delivered: Numbers
     left_out: list[str]  # paths of the numbers that the motion does not show
+    advice: list[str]  # sentences about a better source
 
     def entry(self) -> MemoryEntry:
         """Return what a report says."""
@@ -300,7 +301,7 @@ class Remembered:
 
     def sentences(self) -> list[str]:
         """Return what a user should know."""
-        return [f"{path} is left out: the motion does not show it" for path in self.left_out]
+        return [*(f"{path} is left out: the motion does not show it" for path in self.left_out), *self.advice]
 
 
 def learn_remembered(
@@ -320,13 +321,27 @@ def learn_remembered(
         left_without_bias(fitted, best.recordings),
         left_without_bias(fitted, recordings),
     )
+    measured = on_encoders(structure.start.data, recordings)
+    by_encoders = left_without_bias(fitted, measured) if measured else None
     if np.sum(delivered**2) > MUCH**2 * np.sum(left**2):
         others = learn(recordings)
         again = left_without_bias(others[1].fitted(others[0]), recordings)
         if np.sum(again**2) < np.sum(delivered**2):
             found, learned, gone = others
             source, left, delivered = "the delivered source", again, again
-    return Remembered(found, learned, source, left, delivered, gone)
+    return Remembered(found, learned, source, left, delivered, gone, encoder_advice(by_encoders, delivered))
+
+
+def encoder_advice(by_encoders: Numbers | None, delivered: Numbers) -> list[str]:
+    """Return a sentence if angles of joint encoders leave far less than those of tendon positions, rms [n] (N·m)."""
+    if by_encoders is None or np.sum(delivered**2) <= MUCH**2 * np.sum(by_encoders**2):
+        return []
+    less, more = (", ".join(f"{1e3 * value:.3g}" for value in values) for values in (by_encoders, delivered))
+    which = "with the joint encoders' angles" + (" (rms by joint)" if len(delivered) > 1 else "")
+    return [
+        f"{which} {less} mN·m would be left in place of {more}: angles of tendon positions are too noisy for "
+        "friction that remembers; use --kinematics 2 if the encoders are there when the finger runs"
+    ]
 
 
 def _with_what_shows(

@@ -65,6 +65,6 @@ if TYPE_CHECKING:
         routed,
         smooth_speeds,
     )
-    from .signal_noise import FEWEST, best_angles, joint_position_noise, stopped, zero_phase
+    from .signal_noise import FEWEST, best_angles, joint_position_noise, on_encoders, stopped, zero_phase
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

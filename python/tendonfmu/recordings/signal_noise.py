@@ -164,6 +164,14 @@ def best_angles(data: Data, recordings: Sequence[FitRecording]) -> BestAngles:
     return BestAngles(chosen, np.mean(weights, axis=0))
 
 
+def on_encoders(data: Data, recordings: Sequence[FitRecording]) -> list[FitRecording]:
+    """Return recordings whose runs take the joint encoders, if all can, none does, and they know the angles better."""
+    can = all(each.kinematics == 1 and "joint_position" in each.recording.groups for each in recordings)
+    if not (can and recordings and best_angles(data, recordings).encoders.mean() > 0.5):
+        return []
+    return [replace(recording, kinematics=2) for recording in recordings]
+
+
 def _best(data: Data, recording: FitRecording) -> tuple[FitRecording, Numbers]:
     groups = recording.recording.groups
     joints = len(data["joints"])
