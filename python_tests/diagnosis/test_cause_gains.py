@@ -25,6 +25,11 @@ def test_a_memory_with_many_rows_has_a_range_of_each_unit() -> None:
     assert presliding({"stiffness": [(4e3, "N/m")] * 2}).replace("\xa0", " ") == "a stiffness of 4·10³ N/m"
 
 
+def test_a_reaction_that_a_fit_left_at_zero_is_zero() -> None:
+    words = by_name("joint_coupling").size({"stiffness": [(0.015, "N.m/rad")], "reaction": [(-4.3e-18, "1")]})
+    assert words.endswith("of which the next joint feels 0 times as much")
+
+
 def test_each_further_name_needs_more() -> None:
     """What every finger has does not count: presliding, a delay."""
     effects = ("presliding", "gravity", "stribeck")

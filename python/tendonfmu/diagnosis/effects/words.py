@@ -66,7 +66,7 @@ def with_number(words: Words, name: str, more: str) -> Words:
     """Return a function that adds `more` to the words if the mechanism's number is given and not the default."""
 
     def with_more(numbers: Sizes) -> str:
-        value = numbers.get(name, [(LEFT_OUT[name], "1")])[0][0]
+        value = round(numbers.get(name, [(LEFT_OUT[name], "1")])[0][0], 6) + 0.0  # a fit leaves 1e-18 of 0
         return words(numbers) + ("" if value == LEFT_OUT[name] else more.format(f"{value:.3g}".replace("-", "−")))
 
     return with_more
