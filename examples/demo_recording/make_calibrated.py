@@ -22,7 +22,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 HERE = Path(__file__).resolve().parent
-RIGS = HERE.parent / "rigs"
 GIVEN = HERE.parent / "fingers" / "index_finger.json"
 CALIBRATED = HERE / "index_finger_calibrated.json"
 DURATION = 800.0  # s, of each recording
@@ -38,8 +37,8 @@ Array = NDArray[Any]
 
 def free_motion(folder: Path) -> list[Path]:
     """Recordings of free motion in a folder; those that are there already stay."""
-    sys.path.insert(0, str(RIGS))
-    from virtual_hand import record
+    sys.path.insert(0, str(HERE.parents[1]))
+    from evidence.fit.virtual_hand import record
 
     found = []
     for name, options in FREE.items():
