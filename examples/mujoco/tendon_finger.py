@@ -1,6 +1,6 @@
 """A finger in MuJoCo whose tendons lose force on their way: MuJoCo's own loop, one call of the core in each step.
 
-MuJoCo moves the bodies, stretches the springs and makes the contact and the friction in the joints. The core computes
+MuJoCo moves the bodies, stretches the springs and makes the friction in the joints. The core computes
 from the tendon forces and the joints' motion what the tendons lose (losses.json), as torques on the joints.
 """
 
@@ -102,21 +102,3 @@ class TendonFinger:
         mujoco.mj_comPos(self.model, d)
         mujoco.mj_tendon(self.model, d)
         return self.sense()
-
-    def press_direction(self) -> Array:
-        """Torque at each joint that the tendons have to hold per newton of the plate's push [n] (m)."""
-        jacobian = np.zeros((3, self.model.nv))
-        mujoco.mj_jacSite(self.model, self.data, jacobian, None, self.model.site("fingertip").id)
-        return np.asarray(-jacobian[2])  # the plate pushes the fingertip up, along z
-
-    def contact_force(self) -> float:
-        """True force between fingertip and plate [N]."""
-        force, total = np.zeros(6), 0.0
-        for k in range(self.data.ncon):
-            mujoco.mj_contactForce(self.model, self.data, k, force)
-            total += float(force[0])
-        return total
-
-    def place_plate(self, height: float) -> None:
-        """Put the plate's upper side at a height [m]."""
-        self.data.mocap_pos[0, 2] = height - 0.002
