@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu import Runner
-from tendonfmu.model import pretension_vector
+from tendonfmu.excite import pretension_vector
 
 Array = NDArray[np.float64]
 HERE = Path(__file__).resolve().parent
