@@ -4,42 +4,50 @@ from __future__ import annotations
 
 import os
 import sys
+import tempfile
 import warnings
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tendonfmu import drawing, estimate, files, fmu
+from tendonfmu import calibration, drawing, estimate, files, fmu
 from tendonfmu import report as reporting
-from tendonfmu.commands.command import FingerFile, FreeRecordings, Progress, Report, command, output_option
-from tendonfmu.commands.console import INTERRUPTED, Bar, Result, deliver, fail, say, say_files
-from tendonfmu.options import FitArguments, RecordingSources, keywords
+from tendonfmu.commands.command import (
+    ExtendedFinger,
+    FingerFile,
+    FreeAtPretensions,
+    FreeRecordings,
+    Progress,
+    Report,
+    Scheduler,
+    command,
+    output_option,
+)
+from tendonfmu.commands.console import (
+    INTERRUPTED,
+    Bar,
+    Result,
+    deliver,
+    fail,
+    print_json,
+    print_result,
+    say,
+    say_files,
+)
+from tendonfmu.errors import InputError
+from tendonfmu.options import CalibrateOptions, FitArguments, RecordingSources, keywords
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from tendonfmu.arrays import Numbers
+    from tendonfmu.calibration import Calibration
     from tendonfmu.estimate import FitReport, FrictionFit
     from tendonfmu.fmu import SetParameter
-    from tendonfmu.model import Finger, FingerSource
-
-
-import tempfile
-from collections.abc import Mapping
-from dataclasses import replace
-from html import escape
-from typing import TYPE_CHECKING
-
-from tendonfmu import calibration
-from tendonfmu.commands.command import ExtendedFinger, FreeAtPretensions, Scheduler
-from tendonfmu.commands.console import print_json, print_result
-from tendonfmu.errors import InputError
-from tendonfmu.options import CalibrateOptions
-
-if TYPE_CHECKING:
-    from tendonfmu.calibration import Calibration
     from tendonfmu.model import Finger, FingerSource
 
 

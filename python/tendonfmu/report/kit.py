@@ -1,13 +1,14 @@
 """How numbers, tables and pages are written: one HTML file that contains its figures and needs nothing else.
 
-All texts of a page are escaped.
+All texts of a page are escaped. A diagnosis has two sets of words: one for what the model lacks, one for what has
+changed since a reference.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -20,9 +21,6 @@ from tendonfmu.files import html_template, write_files
 
 if TYPE_CHECKING:
     from tendonfmu.statistics import Interval  # imports scipy
-
-
-from dataclasses import dataclass
 
 NBSP = "\u00a0"
 Row = tuple[str, ...]
