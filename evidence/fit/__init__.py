@@ -42,7 +42,7 @@ PARTS = {
         memory.measure,
         needs=("mujoco",),
         headlines={"chosen.elastic": (0.0, 1.3), "chosen.dahl": (0.0, 2.0), "chosen.maxwell": (0.0, 2.0)},
-        tables={"forms": memory.forms_table, "pretensions": memory.pretensions_table},
+        tables={"forms": memory.forms_table},
     ),
     "paper": Part(
         paper_figures.measure,
