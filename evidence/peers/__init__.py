@@ -115,8 +115,8 @@ def error_table(figures: Figures) -> str:
     for tool in TOOLS:
         line = [tool]
         for name in NAMES:
-            (row,) = table.where(figures["rows"], machine=name, tool=tool)
-            text = " ".join(f"{value:.3g}" for value in row["rms"])
+            (row,) = table.where(figures["rows"], machine=name, tool=tool) or [{"rms": None}]
+            text = " ".join(f"{value:.3g}" for value in row["rms"]) if row["rms"] else table.NOTHING
             line.append(f"**{text}**" if figures["wins"][name] == tool else text)
         lines.append(line)
     return table.table(["tool", *NAMES], lines)
