@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import copy
 import json
-import subprocess
-import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from evidence.cases import EXAMPLES, INDEX_FINGER, INDEX_RIG, write
+from evidence.cases import EXAMPLES, INDEX_FINGER, INDEX_RIG, tendonfmu, write
 from evidence.part import Figures
 from tendonfmu.estimate import FrictionFit
 
@@ -39,9 +37,8 @@ def record(folder: Path, name: str, duration: float, options: Sequence[str]) -> 
             "recording": {"duration": duration},
         },
     )
-    excite: list[str | Path] = ["excite", INDEX_RIG, "-o", motion, "--duration", str(duration), *options]
-    for words in (excite, ["simulate", rig, "-o", recording]):
-        subprocess.run([sys.executable, "-m", "tendonfmu", *words], check=True, capture_output=True)
+    tendonfmu("excite", INDEX_RIG, "-o", motion, "--duration", str(duration), *options)
+    tendonfmu("simulate", rig, "-o", recording)
     return recording
 
 
