@@ -10,6 +10,8 @@ import importlib.util
 import json
 import math
 import os
+import resource
+import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -27,6 +29,7 @@ INDEX_FINGER = EXAMPLES / "fingers" / "index_finger.json"
 INDEX_RIG = EXAMPLES / "rigs" / "index_finger.json"
 DATA = Path(os.environ.get("TENDONFMU_DATA") or ROOT.parent / "shared" / "data")  # recordings that others have made
 FOREIGN = DATA.parent / "foreign"
+LIMIT = 3600.0  # s that a command may take
 
 
 def is_there(need: str) -> bool:
@@ -50,6 +53,28 @@ def run_cases(function: Function, cases: Mapping[str, Sequence[Any]], folder: Pa
     if failed:
         raise RuntimeError("\n".join(["cases failed:", *failed]))
     return rows
+
+
+def tendonfmu(*words: str | Path, folder: Path | None = None) -> float:
+    """Call the command in a folder, as a user does; return its processor time, s.
+
+    Raises RuntimeError with the last lines of its report of an internal error, else of what it said.
+    """
+    before = _seconds_of_children()
+    command = [sys.executable, "-m", "tendonfmu", *words]
+    ended = subprocess.run(
+        command, cwd=folder, timeout=LIMIT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
+    if ended.returncode:
+        reports = sorted((folder or Path()).glob("tendonfmu-error-*.txt"))
+        said = reports[-1].read_text(encoding="utf-8") if reports else ended.stdout
+        raise RuntimeError("\n".join(said.strip().splitlines()[-4:]) or f"exit status {ended.returncode}")
+    return _seconds_of_children() - before
+
+
+def _seconds_of_children() -> float:
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
 
 
 def _progress(name: str, done: int, total: int) -> None:

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Builds the documentation site with MkDocs into FOLDER (default build/site): tools/build_site.sh [FOLDER]
 # Broken links, anchors and references are errors. MkDocs has an environment of its own, build/site-venv.
-# Notebooks are shown as `python tools/run_notebooks.py build/notebooks` last ran them, or without outputs.
+# Notebooks are shown as `tools/run_notebooks.sh build/notebooks` last ran them, or without outputs.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 output=$(realpath -m "${1:-build/site}")

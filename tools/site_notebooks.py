@@ -1,6 +1,6 @@
 """Pages of the documentation site from notebooks: cells as Markdown, tables as HTML, Plotly figures as scripts.
 
-`run_notebooks.py` makes notebooks with outputs. Without them the pages have text and code, and a note.
+`run_notebooks.sh` makes notebooks with outputs. Without them the pages have text and code, and a note.
 """
 
 from __future__ import annotations

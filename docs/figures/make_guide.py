@@ -1,6 +1,6 @@
-"""Makes the pictures of docs/guide, docs/reference/paper.md and examples/mujoco by the commands of these pages.
+"""Makes the pictures of docs/guide and docs/reference/paper.md by the commands of these pages.
 
-    python docs/figures/make_guide.py [-o FOLDER]      some 5 min of one core; needs tendonfmu, Pillow, MuJoCo, Chromium
+    python docs/figures/make_guide.py [-o FOLDER]      some 5 min of one core; needs tendonfmu, Pillow, Chromium
 
 The pages that the commands write are photographed in a headless Chromium, and become small PNGs.
 """
@@ -59,10 +59,9 @@ def main() -> None:
 
 
 def drawings(folder: Path, output: Path) -> None:
-    """The paper's figures, drawn again, and the force on a plate."""
+    """The paper's figures, drawn again."""
     subprocess.run([sys.executable, "-m", "evidence", "fit.paper", "-o", folder], cwd=EXAMPLES.parent, check=True)
-    subprocess.run([sys.executable, EXAMPLES / "mujoco" / "press.py", "-o", folder / "mujoco_press.html"], check=True)
-    for page in [folder / "mujoco_press.html", *(folder / "fit.paper").glob("paper_*.html")]:
+    for page in (folder / "fit.paper").glob("paper_*.html"):
         keep(photograph(page, 1100, width=820), output / f"{page.stem}.png")
 
 

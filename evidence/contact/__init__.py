@@ -7,16 +7,13 @@ from __future__ import annotations
 
 import itertools
 import json
-import resource
-import subprocess
-import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from evidence import table
-from evidence.cases import INDEX_RIG, run_cases, write
+from evidence.cases import INDEX_RIG, run_cases, tendonfmu, write
 from evidence.contact import hand
 from evidence.contact.sensor_faults import fault_table, judged_faults
 from evidence.part import Figures, Part
@@ -201,18 +198,12 @@ def calibrated(folder: Path, number: int) -> Path:
     if not (into / "cpu.json").exists():
         pushed_fingers.make(folder, number)
         free, pushed = (
-            [
-                str(pushed_fingers.place(folder, number, *one))
-                for one in itertools.product(kinds, pushed_fingers.PRETENSIONS)
-            ]
+            [pushed_fingers.place(folder, number, *one) for one in itertools.product(kinds, pushed_fingers.PRETENSIONS)]
             for kinds in (pushed_fingers.FREE, pushed_fingers.PUSHED)
         )
         description = pushed_fingers.description_file(folder, number)
-        command = [sys.executable, "-m", "tendonfmu", "calibrate", str(description), *free, "--pushes", *pushed]
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        subprocess.run([*command, "-o", str(into), "--no-progress"], check=True)
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        write(into / "cpu.json", json.dumps(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime))
+        seconds = tendonfmu("calibrate", description, *free, "--pushes", *pushed, "-o", into, "--no-progress")
+        write(into / "cpu.json", json.dumps(seconds))
     return into
 
 

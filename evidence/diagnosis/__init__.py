@@ -7,17 +7,19 @@ chosen on even seeds and numbers; the odd ones judge it.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
-from evidence.cases import run_cases
+from evidence.cases import FOREIGN, run_cases
 from evidence.diagnosis import sizes
 from evidence.diagnosis.case import Case, diagnosed
 from evidence.diagnosis.judge import UNKNOWN, Truth, in_words, judge, leaves_unnamed
-from evidence.families import cases, recorded
+from evidence.families import cases
 from evidence.families.finger import NONE
 from evidence.part import Figures, Part
 from evidence.table import NOTHING, Row, count, table, where
@@ -25,6 +27,7 @@ from tendonfmu.statistics.intervals import share
 
 FAMILIES = ("recorded", *cases.FAMILIES)
 SEEDS = range(1, 2 * len(cases.ORDER), 2)
+RECORDED = range(1, 27, 2)
 # What a simulator has although no description says so; naming it is not false. Presliding and what belongs to it are
 # right in every case: no simulator's friction jumps as the paper's laws do.
 ALSO = {
@@ -46,9 +49,8 @@ def run_case(family: str, number: int, folder: Path) -> Row:
     """The row of a case; `hidden` alone where what it hides cannot be seen in its torque."""
     row: Row = {"family": family, "number": number}
     if family == "recorded":
-        made = recorded.make(number)
-        truth = truth_of(family, made.hidden, made.joint, made.tendon, visible=made.hidden not in ABSORBED)
-        case, hidden, true = Case(made.nominal, made.train, truth, made.test), made.hidden, {}
+        case, hidden = recorded(number)
+        truth, true = case.truth, {}
     else:
         kept = cases.kept(folder, family, number)
         hidden = kept.hidden.effect
@@ -78,6 +80,16 @@ def run_case(family: str, number: int, folder: Path) -> Row:
     }
 
 
+def recorded(number: int) -> tuple[Case, str]:
+    """A LuGre finger that nobody of the project made, in `shared/foreign` beside the repository; what it hides."""
+    name = f"case_{number:02d}"
+    truth, finger = (json.loads((FOREIGN / f"{file}.json").read_text(encoding="utf-8")) for file in ("truth", name))
+    hidden, (joint, tendon) = truth[name]["hidden"], map(truth[name].get, ("joint", "tendon"))
+    train, test = (pd.read_parquet(FOREIGN / f"{name}_{part}.parquet") for part in ("train", "test"))
+    visible = hidden not in ABSORBED
+    return Case(finger, train, truth_of("recorded", hidden, joint, tendon, visible), test), hidden
+
+
 def truth_of(family: str, hidden: str, joint: int | None, tendon: int | None, visible: bool = True) -> Truth:
     """What counts; what is on no list may look like a contact."""
     outside = is_outside(hidden)
@@ -97,7 +109,7 @@ def is_outside(hidden: str) -> bool:
 
 
 def measure(folder: Path, workers: int) -> Figures:
-    numbers = {family: recorded.NUMBERS[::2] if family == "recorded" else SEEDS for family in FAMILIES}
+    numbers = {family: RECORDED if family == "recorded" else SEEDS for family in FAMILIES}
     rows = run_cases(
         run_case,
         {f"{family}_{n:03d}": (family, n, folder / "cases") for family in FAMILIES for n in numbers[family]},

@@ -2,26 +2,9 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-from pathlib import Path
-
-from evidence.cases import EXAMPLES
-from evidence.fit import memory, paper_figures
+from evidence.fit import memory, paper_figures, virtual_hand
 from evidence.part import Figures, Part
 from evidence.table import of_cells, table
-
-HAND = ("excite, 10 N", "excite, 40 N", "strokes, 10 N", "strokes, 40 N")
-
-
-def virtual_hand(folder: Path, workers: int) -> Figures:
-    """The lines that the example prints, in %; of its fits those of symmetric laws to varied tension."""
-    program = [sys.executable, str(EXAMPLES / "rigs" / "virtual_hand.py"), "-o", str(folder)]
-    done = subprocess.run(program, capture_output=True, text=True, check=True)
-    printed = [[cell.strip() for cell in line.strip()[1:-1].split("|")] for line in done.stdout.splitlines()[2:]]
-    lines = [[*line[:2], *line[4:]] for line in printed if line[1] != "constant" and line[2] != "asymmetric"]
-    best = next(line for line in lines if line[:2] == ["of the paper", "varied"])
-    return {"lines": lines, "left": [float(cell.split()[0].strip("*")) for cell in best[2:]]}
 
 
 def contact_table(figures: Figures) -> str:
@@ -51,15 +34,15 @@ def prediction_table(figures: Figures) -> str:
 
 PARTS = {
     "virtual_hand": Part(
-        virtual_hand,
+        virtual_hand.measure,
         headlines={"left.0": (10, 20), "left.1": (10, 25), "left.2": (10, 20), "left.3": (10, 25)},
-        tables={"residual": of_cells("lines", ["bias", "training", *HAND], 2)},
+        tables={"residual": of_cells("lines", ["bias", "training", *virtual_hand.JUDGED], 2)},
     ),
     "memory": Part(
         memory.measure,
         needs=("mujoco",),
         headlines={"chosen.elastic": (0.0, 1.3), "chosen.dahl": (0.0, 2.0), "chosen.maxwell": (0.0, 2.0)},
-        tables={"forms": memory.forms_table, "pretensions": memory.pretensions_table},
+        tables={"forms": memory.forms_table},
     ),
     "paper": Part(
         paper_figures.measure,

@@ -15,11 +15,10 @@ import numpy as np
 import pandas as pd
 
 from evidence.cases import run_cases
-from evidence.families import cases, elastic, finger
-from evidence.families.finger import NONE, Hidden
-from evidence.families.motion import random_motion
+from evidence.families import cases
+from evidence.families.finger import NONE
 from evidence.part import Figures
-from evidence.table import NOTHING, Row, number, table, where
+from evidence.table import Row, number, table, where
 from tendonfmu import run
 from tendonfmu.arrays import Numbers
 from tendonfmu.commands.fit import fit
@@ -43,7 +42,6 @@ FORMS: dict[str, tuple[Mapping[str, Any], ...]] = {
     "the same, absolute stiffness": (_STIFF, _CORDS),
 }
 CHOSEN = "chosen by the product"
-PRETENSIONS = (12.0, 24.0)  # N
 
 
 def measure(folder: Path, workers: int) -> Figures:
@@ -56,8 +54,7 @@ def measure(folder: Path, workers: int) -> Figures:
         for kinematics in (ENCODERS, *((TENDONS,) if form in (forms[0], CHOSEN) else ()))
     }
     rows = run_cases(left_of_form, named, folder, workers)
-    other = run_cases(left_at_pretensions, {f"pretension_{s}": (s,) for s in SEEDS}, folder / "pretension", workers)
-    return {"forms": rows, "pretensions": other, "chosen": {f: typical(rows, f, CHOSEN) for f in cases.FAMILIES}}
+    return {"forms": rows, "chosen": {family: typical(rows, family, CHOSEN) for family in cases.FAMILIES}}
 
 
 def left_of_form(folder: Path, family: str, seed: int, form: str, kinematics: int) -> Row:
@@ -66,24 +63,6 @@ def left_of_form(folder: Path, family: str, seed: int, form: str, kinematics: in
     fitted = learned(case.nominal, [case.recordings["train"]], form, kinematics)
     left = residual(fitted, case.recordings["test"], kinematics)
     return {"family": family, "seed": seed, "form": form, "kinematics": kinematics, "left": rms_by_joint(left)}
-
-
-def left_at_pretensions(seed: int) -> Row:
-    """A finger in MuJoCo that learns at one pretension or at both, and is judged at each [N·m by joint]."""
-    rng = np.random.default_rng((seed, 12))
-    made = finger.finger(elastic.JOINTS, rng)
-    nominal = finger.describe(made, Hidden(), rng)
-    recordings = {}
-    for k, (pretension, seconds) in enumerate((p, s) for p in PRETENSIONS for s in (cases.TRAIN, cases.TEST)):
-        trace = elastic.simulate(made, Hidden(), random_motion(elastic.JOINTS, pretension, rng), seconds)
-        recordings[pretension, seconds] = finger.record(trace, Hidden(), np.random.default_rng((seed, k)))
-    row: Row = {"seed": seed}
-    for name, pretensions in (("one", PRETENSIONS[:1]), ("both", PRETENSIONS)):
-        fitted = learned(nominal, [recordings[p, cases.TRAIN] for p in pretensions], CHOSEN, ENCODERS)
-        for judged in PRETENSIONS:
-            left = residual(fitted, recordings[judged, cases.TEST], ENCODERS)
-            row[f"{name}, {judged:g} N"] = rms_by_joint(left)
-    return row
 
 
 def learned(nominal: Mapping[str, Any], recordings: Sequence[pd.DataFrame], form: str, kinematics: int) -> Finger:
@@ -140,14 +119,3 @@ def forms_table(figures: Figures) -> str:
             if any(value is not None for value in values):
                 lines.append([form, angles, *(number(value) for value in values)])
     return table(["friction remembers", "angles from", *cases.FAMILIES], lines, 2)
-
-
-def pretensions_table(figures: Figures) -> str:
-    lines = []
-    for learnt in ("one", "both"):
-        for judged in PRETENSIONS:
-            rows = [row[f"{learnt}, {judged:g} N"] for row in figures["pretensions"]]
-            at = "12 N" if learnt == "one" else "12 and 24 N"
-            left = " ".join(f"{1e3 * value:.1f}" for value in np.median(rows, axis=0)) if rows else NOTHING
-            lines.append([at, f"{judged:g} N", left])
-    return table(["learned at", "judged at", "mN·m rms by joint, median of the fingers"], lines, 2)

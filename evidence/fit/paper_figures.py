@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -12,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from evidence.cases import EXAMPLES, INDEX_FINGER
+from evidence.cases import EXAMPLES, INDEX_FINGER, tendonfmu
 from evidence.part import Figures
 from evidence.table import rms
 from tendonfmu.arrays import Numbers
@@ -108,8 +106,7 @@ def figure_5(folder: Path) -> Figures:
 def simulated(rig: str, folder: Path) -> tuple[Path, Recording, pd.DataFrame]:
     """The recording's file, itself, and the truth at the same times."""
     recording, truth = folder / f"{rig}.parquet", folder / f"{rig}_truth.parquet"
-    words = ["simulate", str(EXAMPLES / "rigs" / f"{rig}.json"), "-o", str(recording), "--truth", str(truth)]
-    subprocess.run([sys.executable, "-m", "tendonfmu", *words], check=True, stdout=subprocess.DEVNULL)
+    tendonfmu("simulate", EXAMPLES / "rigs" / f"{rig}.json", "-o", recording, "--truth", truth)
     return recording, read_recording(recording), pd.read_parquet(truth)
 
 

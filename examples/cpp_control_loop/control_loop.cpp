@@ -1,7 +1,6 @@
 // A control loop that feels contact through the tendons.
 //
-//   control_loop FINGER.json [--rate HZ] [--seconds S]             a simulated hand
-//   control_loop FINGER.json --recording REC.csv [--no-wait]       a recording, at its own pace or at once
+//   control_loop FINGER.json RECORDING.csv [--no-wait]       at the pace of the recording, or at once
 //
 // Start-up reads files and may throw. The loop neither allocates nor throws, and calls the system only to wait for the
 // next sample and to print.
@@ -16,50 +15,11 @@
 #include <thread>
 #include <vector>
 
-#include "signal_source.hpp"
+#include "recording.hpp"
 
 namespace {
 
 using monotonic = std::chrono::steady_clock;
-
-struct settings {
-  std::string finger, recording;
-  double rate = 1000.0;  // Hz
-  double seconds = 5.0;  // of the simulated hand
-  bool waits = true;
-};
-
-double positive(const std::string& option, const char* text) {
-  char* end = nullptr;
-  const double value = text ? std::strtod(text, &end) : 0.0;
-  if (!text || *end != 0 || !(value > 0.0)) {
-    throw std::invalid_argument(option + ": expected a positive number");
-  }
-  return value;
-}
-
-settings read_arguments(char** argument) {
-  settings found;
-  while (*++argument) {
-    const std::string option = *argument;
-    if (option == "--no-wait") {
-      found.waits = false;
-    } else if (option == "--rate" || option == "--seconds") {
-      (option == "--rate" ? found.rate : found.seconds) = positive(option, argument[1]);
-      ++argument;
-    } else if (option == "--recording" && argument[1]) {
-      found.recording = *++argument;
-    } else if (found.finger.empty() && option[0] != '-') {
-      found.finger = option;
-    } else {
-      throw std::invalid_argument(option + ": unknown, or its value is missing");
-    }
-  }
-  if (found.finger.empty()) {
-    throw std::invalid_argument("control_loop FINGER.json [--rate HZ] [--seconds S] [--recording REC.csv] [--no-wait]");
-  }
-  return found;
-}
 
 tendonfmu::finger load_finger(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
@@ -97,8 +57,7 @@ void print_change(double time, bool contact, tendonfmu::span<const double> torqu
 }
 
 // `torque` [n] is room for the compensated torques.
-summary control(tendonfmu::finger& finger, signal_source& source, const settings& chosen,
-                tendonfmu::span<double> torque) noexcept {
+summary control(tendonfmu::finger& finger, recording& source, bool waits, tendonfmu::span<double> torque) noexcept {
   summary found;
   unsigned char contact = 0, before = 0;
   tendonfmu::outputs wanted;
@@ -106,8 +65,8 @@ summary control(tendonfmu::finger& finger, signal_source& source, const settings
   wanted.contact = tendonfmu::one(contact);
 
   const auto start = monotonic::now();
-  for (sample now; source.read(now) && (!chosen.recording.empty() || now.time < chosen.seconds);) {
-    if (chosen.waits) {
+  for (sample now; source.read(now);) {
+    if (waits) {
       std::this_thread::sleep_until(
           start + std::chrono::duration_cast<monotonic::duration>(std::chrono::duration<double>(now.time)));
       found.latest = std::fmax(found.latest, seconds_since(start) - now.time);
@@ -136,18 +95,21 @@ summary control(tendonfmu::finger& finger, signal_source& source, const settings
 
 }  // namespace
 
-int main(int, char** arguments) {
+int main(int count, char** argument) {
+  const bool waits = count == 3;
+  if (!waits && !(count == 4 && std::string(argument[3]) == "--no-wait")) {
+    std::fputs("usage: control_loop FINGER.json RECORDING.csv [--no-wait]\n", stderr);
+    return 2;
+  }
   try {
-    const settings chosen = read_arguments(arguments);
-    tendonfmu::finger finger = load_finger(chosen.finger);
-    const auto source = chosen.recording.empty() ? simulated_hand(finger, chosen.rate)
-                                                 : recording(chosen.recording, finger.tendon_count());
+    tendonfmu::finger finger = load_finger(argument[1]);
+    recording source(argument[2], finger.tendon_count());
     std::vector<double> torque(finger.joint_count());
-    const summary found = control(finger, *source, chosen, torque);
+    const summary found = control(finger, source, waits, torque);
     std::printf("%zu joints, %zu tendons, kernel %s: %ld samples, %ld refused, %ld contacts, longest step %.1f us",
                 finger.joint_count(), finger.tendon_count(), finger.get_kernel(), found.samples, found.refused,
                 found.contacts, 1e6 * found.longest_step);
-    std::printf(chosen.waits ? ", latest sample %.2f ms late\n" : "\n", 1e3 * found.latest);
+    std::printf(waits ? ", latest sample %.2f ms late\n" : "\n", 1e3 * found.latest);
     return found.refused > 0 ? 1 : 0;
   } catch (const std::exception& caught) {
     std::fprintf(stderr, "control_loop: %s\n", caught.what());

@@ -9,7 +9,6 @@ each description makes of the demo's recordings, as README.md has it.
 from __future__ import annotations
 
 import argparse
-import json
 import shutil
 import subprocess
 import sys
@@ -21,8 +20,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+import tendonfmu as tf
+
 HERE = Path(__file__).resolve().parent
-RIGS = HERE.parent / "rigs"
 GIVEN = HERE.parent / "fingers" / "index_finger.json"
 CALIBRATED = HERE / "index_finger_calibrated.json"
 DURATION = 800.0  # s, of each recording
@@ -36,41 +36,29 @@ RECORDINGS = {
 Array = NDArray[Any]
 
 
-def free_motion(folder: Path) -> list[Path]:
-    """Recordings of free motion in a folder; those that are there already stay."""
-    sys.path.insert(0, str(RIGS))
-    from virtual_hand import record
-
-    found = []
-    for name, options in FREE.items():
-        recording = folder / f"{name}.parquet"
-        found.append(recording if recording.is_file() else record(folder, name, DURATION, options))
-    return found
-
-
 def calibrate(folder: Path, jobs: int) -> Path:
     """The calibrated description in a folder, of `tendonfmu calibrate`: a call that is repeated goes on."""
-    command = [sys.executable, "-m", "tendonfmu", "calibrate", str(GIVEN), *map(str, free_motion(folder))]
-    pushes = ["--pushes", str(HERE / "index_finger_pushes.parquet")]
+    sys.path.insert(0, str(HERE.parents[1]))
+    from evidence.fit.virtual_hand import record
+
+    free = [folder / f"{name}.parquet" for name in FREE]
+    for recording, options in zip(free, FREE.values(), strict=True):
+        if not recording.is_file():
+            record(folder, recording.stem, DURATION, options)
+    command = [sys.executable, "-m", "tendonfmu", "calibrate", GIVEN, *free]
+    pushes = ["--pushes", HERE / "index_finger_pushes.parquet"]
     output = folder / "calibrated"
-    subprocess.run([*command, *pushes, "-o", str(output), "--jobs", str(jobs), "--progress"], check=True)
+    subprocess.run([*command, *pushes, "-o", output, "--jobs", str(jobs), "--progress"], check=True)
     return output / "finger.json"
-
-
-# --- what the descriptions make of the demo's recordings --------------------------------------------------------------
 
 
 def rows(finger: Path) -> Iterator[tuple[str, list[str]]]:
     """(what, before → after of each joint in mN·m) of free motion, and of the time in contact."""
-    from tendonfmu.model.native import Instance
-    from tendonfmu.recordings.recording import read_recording
-
-    description = json.loads(finger.read_text(encoding="utf-8"))
     for name, what in RECORDINGS.items():
-        recording = read_recording(HERE / f"{name}.parquet")
-        given = Instance.from_description(description).run(recording.arrays())
+        recording = tf.read_recording(HERE / f"{name}.parquet")
+        outputs = tf.run(finger, recording).outputs
         label = np.zeros(len(recording), bool) if recording.contact is None else recording.contact
-        torque, left = given["joint_torque"], given["compensated_torque"]
+        torque, left = outputs["joint_torque"], outputs["compensated_torque"]
         yield f"{what}: τ → compensated", cells(torque[~label], left[~label])
     load = recording.groups["external_torque"]
     words = "with pushes, in contact: `external_torque` → compensated minus that"
@@ -83,14 +71,6 @@ def cells(before: Array, after: Array) -> list[str]:
     return [f"{one:.1f} → {other:.1f}" for one, other in zip(*rms, strict=True)]
 
 
-def print_table() -> None:
-    print("| | | abduction | mcp flexion | pip flexion | dip flexion |")
-    print("| --- | --- | ---: | ---: | ---: | ---: |")
-    for words, finger in (("as given", GIVEN), ("calibrated", CALIBRATED)):
-        for what, found in rows(finger):
-            print(f"| {words} | {what} | {' | '.join(found)} |")
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("-o", "--output", type=Path, help="folder for motions (70 MB), recordings and calibration")
@@ -101,7 +81,11 @@ def main() -> None:
         folder = arguments.output or Path(tempfile.mkdtemp())
         folder.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(calibrate(folder.resolve(), arguments.jobs), CALIBRATED)
-    print_table()
+    print("| | | abduction | mcp flexion | pip flexion | dip flexion |")
+    print("| --- | --- | ---: | ---: | ---: | ---: |")
+    for words, finger in (("as given", GIVEN), ("calibrated", CALIBRATED)):
+        for what, found in rows(finger):
+            print(f"| {words} | {what} | {' | '.join(found)} |")
 
 
 if __name__ == "__main__":

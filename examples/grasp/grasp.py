@@ -20,7 +20,6 @@ from pathlib import Path
 import fmpy
 import numpy as np
 from controller import JOINTS, RIG_PRETENSION, SPACE, STEP, Array, Loop, Task, numbered
-from fmpy.fmi2 import FMU2Slave
 
 SETTLED = 1.5  # s after a new force is wanted, from which on errors count
 
@@ -33,11 +32,7 @@ class Component:
         description = fmpy.read_model_description(self._folder, validate=False)
         self.vr = {variable.name: variable.valueReference for variable in description.modelVariables}
         self.inputs = [variable.name for variable in description.modelVariables if variable.causality == "input"]
-        identifier = description.coSimulation.modelIdentifier
-        self.fmu = FMU2Slave(
-            guid=description.guid, unzipDirectory=self._folder, modelIdentifier=identifier, instanceName=path.stem
-        )
-        self.fmu.instantiate()
+        self.fmu = fmpy.instantiate_fmu(self._folder, description, "CoSimulation")
         self.fmu.setupExperiment(startTime=0.0)
         self.fmu.enterInitializationMode()
 

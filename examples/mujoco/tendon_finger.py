@@ -1,122 +1,111 @@
-"""A finger in MuJoCo whose tendons lose force on their way: MuJoCo's own loop, one call of the core in each step.
+"""Records free motion of a finger in MuJoCo whose tendons lose force on their way.
 
-MuJoCo moves the bodies, stretches the springs and makes the contact and the friction in the joints. The core computes
-from the tendon forces and the joints' motion what the tendons lose (losses.json), as torques on the joints.
+    python tendon_finger.py -o free.parquet [--seconds 60] [--pretension 10]
+
+MuJoCo moves the bodies, stretches the springs and makes the friction in the joints. In each step of its loop the core
+computes from the tendon forces and the joints' motion what the tendons lose (losses.json), as torques on the joints.
 """
 
 from __future__ import annotations
 
+import argparse
 import json
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu import Runner
-from tendonfmu.model import pretension_vector
+from tendonfmu.excite import pretension_vector
+from tendonfmu.files import write_table
 
 Array = NDArray[np.float64]
 HERE = Path(__file__).resolve().parent
-MODEL, LOSSES = HERE / "finger.xml", HERE / "losses.json"
-JOINTS = ("mcp", "pip")
-TENDONS = ("flexor_deep", "flexor_short", "extensor_long", "extensor_short")
 STEP = 0.001  # s
 FORCE_NOISE = 0.02  # N, of a load cell
-
-
-@dataclass(frozen=True)
-class Sample:
-    """What the sensors of the finger read at one time."""
-
-    time: float  # s
-    tendon_force: Array  # [m], N
-    tendon_position: Array  # [m], m
-    joint_position: Array  # [n], rad
-    joint_velocity: Array  # [n], rad/s
-
-
-def step(runner: Runner, sample: Sample) -> Any:
-    """Outputs of a description at a sample; its arrays hold until the next step."""
-    return runner.step(
-        sample.time,
-        tendon_force=sample.tendon_force,
-        tendon_position=sample.tendon_position,
-        joint_position=sample.joint_position,
-        joint_velocity=sample.joint_velocity,
-    )
+SETTLE = 1.0  # s before the recording begins
+LOWEST, HIGHEST = np.array([-0.25, 0.05]), np.array([1.1, 0.95])  # rad
 
 
 class TendonFinger:
-    """The finger of finger.xml with the losses of losses.json, stepped at 1 kHz.
+    """The finger of finger.xml with the losses of losses.json, stepped at 1 kHz. seed: of the sensors' noise."""
 
-    pretension: mean tendon force at rest [N]. seed: of the sensors' noise.
-    """
-
-    def __init__(self, pretension: float = 10.0, seed: int = 1) -> None:
-        description = json.loads(LOSSES.read_text(encoding="utf-8"))
+    def __init__(self, seed: int) -> None:
+        description = json.loads((HERE / "losses.json").read_text(encoding="utf-8"))
         self.losses = Runner(description, kinematics=3)
-        self.model = mujoco.MjModel.from_xml_path(str(MODEL))
+        self.model = mujoco.MjModel.from_xml_path(str(HERE / "finger.xml"))
         self.data = mujoco.MjData(self.model)
         self.random = np.random.default_rng(seed)
         self.arms = np.array([tendon["moment_arms"] for tendon in description["tendons"]])
         self.stiffness = np.array([tendon["stiffness"] for tendon in description["tendons"]])
         self.preload = pretension_vector(description) / self.stiffness  # m per N of pretension
-        self.pretension = pretension
-        self.motors = pretension * self.preload
         mujoco.mj_forward(self.model, self.data)
         self.reference = self.data.ten_length.copy()  # m, at joint angle 0: where tendon positions count from
 
-    @property
-    def angles(self) -> Array:
-        return np.array(self.data.qpos)
+    def tension(self, motors: Array) -> Array:
+        """Force of each spring [N] where the joints are now; it pulls only."""
+        for compute in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_tendon):
+            compute(self.model, self.data)
+        return np.asarray(np.clip(self.stiffness * (self.data.ten_length - self.reference + motors), 0.0, 100.0))
 
-    def motors_for(self, angles: Array) -> Array:
-        """Tendon positions that hold the joints at these angles if nothing rubs or weighs [m]."""
-        return np.asarray(self.arms @ angles + self.pretension * self.preload)
-
-    def tension(self) -> Array:
-        """Force of each spring [N]; it pulls only."""
-        stretched = self.data.ten_length - self.reference + self.motors
-        return np.asarray(np.clip(self.stiffness * stretched, 0.0, 100.0))
-
-    def sense(self) -> Sample:
-        """What the sensors read now."""
-        force = self.tension() + self.random.normal(0.0, FORCE_NOISE, len(TENDONS))
-        return Sample(self.data.time, force, self.motors.copy(), self.angles, self.data.qvel.copy())
-
-    def step(self, motors: Array) -> Sample:
-        """Move the motors [m], let the tendons lose force, step MuJoCo, and read the sensors."""
-        self.motors = motors
-        d = self.data
-        mujoco.mj_kinematics(self.model, d)
-        mujoco.mj_comPos(self.model, d)
-        mujoco.mj_tendon(self.model, d)
-        true = Sample(d.time, self.tension(), motors, self.angles, d.qvel.copy())
-        d.qfrc_applied[:] = -step(self.losses, true).friction_torque
+    def step(self, angles: Array, pretension: float) -> Array:
+        """Move the motors as the angles ask, let the tendons lose force, step MuJoCo; time and readings of a row."""
+        motors, d = self.arms @ angles + pretension * self.preload, self.data
+        force = self.tension(motors)
+        lost = self.losses.step(
+            d.time,
+            tendon_force=force,
+            tendon_position=motors,
+            joint_position=d.qpos.copy(),
+            joint_velocity=d.qvel.copy(),
+        )
+        d.qfrc_applied[:] = -lost.friction_torque
         d.ctrl[:] = self.reference - motors  # a position servo of the tendon's length: the spring behind the motor
         mujoco.mj_step(self.model, d)
-        mujoco.mj_kinematics(self.model, d)
-        mujoco.mj_comPos(self.model, d)
-        mujoco.mj_tendon(self.model, d)
-        return self.sense()
+        read = self.tension(motors) + self.random.normal(0.0, FORCE_NOISE, len(motors))
+        return np.concatenate([[d.time - SETTLE], read, motors, d.qpos, d.qvel])
 
-    def press_direction(self) -> Array:
-        """Torque at each joint that the tendons have to hold per newton of the plate's push [n] (m)."""
-        jacobian = np.zeros((3, self.model.nv))
-        mujoco.mj_jacSite(self.model, self.data, jacobian, None, self.model.site("fingertip").id)
-        return np.asarray(-jacobian[2])  # the plate pushes the fingertip up, along z
 
-    def contact_force(self) -> float:
-        """True force between fingertip and plate [N]."""
-        force, total = np.zeros(6), 0.0
-        for k in range(self.data.ncon):
-            mujoco.mj_contactForce(self.model, self.data, k, force)
-            total += float(force[0])
-        return total
+def motion(seconds: float, seed: int) -> Array:
+    """[N, n] wanted angles: strokes of both joints between random angles, smooth, at up to some 2 rad/s."""
+    random = np.random.default_rng(seed)
+    columns = []
+    for low, high in zip(LOWEST, HIGHEST, strict=True):
+        at, parts, count = 0.3, [np.full(round(SETTLE / STEP), 0.3)], 0
+        while count < seconds / STEP:
+            target = random.uniform(low, high)
+            s = np.linspace(0.0, 1.0, round(random.uniform(0.5, 2.0) / STEP))
+            parts.append(at + (target - at) * s**3 * (10 - 15 * s + 6 * s**2))
+            at, count = target, count + len(s)
+        columns.append(np.concatenate(parts)[: round((SETTLE + seconds) / STEP)])
+    return np.column_stack(columns)
 
-    def place_plate(self, height: float) -> None:
-        """Put the plate's upper side at a height [m]."""
-        self.data.mocap_pos[0, 2] = height - 0.002
+
+def record(seconds: float, pretension: float, seed: int) -> dict[str, Array]:
+    """Columns at 1 kHz; the pretension varies by 30 %, which shows friction that grows with the force."""
+    finger = TendonFinger(seed)
+    finger.data.qpos[:] = 0.3
+    rows = [
+        finger.step(angles, pretension * (1.0 + 0.3 * np.sin(2 * np.pi * 0.07 * k * STEP)))
+        for k, angles in enumerate(motion(seconds, seed))
+    ]
+    names = ["time"]
+    for group, count in (("tendon_force", 4), ("tendon_position", 4), ("joint_position", 2), ("joint_velocity", 2)):
+        names += [f"{group}[{i}]" for i in range(1, count + 1)]
+    return dict(zip(names, np.array([row for row in rows if row[0] > 0.0]).T, strict=True))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("-o", "--output", type=Path, default=Path("free.parquet"))
+    parser.add_argument("--seconds", type=float, default=60.0)
+    parser.add_argument("--pretension", type=float, default=10.0, help="N, mean tendon force at rest")
+    parser.add_argument("--seed", type=int, default=1)
+    given = parser.parse_args()
+    write_table(given.output, record(given.seconds, given.pretension, given.seed))
+    print(given.output)
+
+
+if __name__ == "__main__":
+    main()

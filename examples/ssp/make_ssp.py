@@ -5,7 +5,7 @@ python make_ssp.py [RIG.json] [OUT.ssp] [FINGER.json]
 
 from __future__ import annotations
 
-import sys
+import argparse
 from pathlib import Path
 
 from tendonfmu.errors import InputError
@@ -14,20 +14,18 @@ from tendonfmu.simulate.ssp import build_ssp
 RIG = Path(__file__).resolve().parent.parent / "rigs" / "index_finger_pushes.json"
 
 
-def main(arguments: list[str]) -> int:
-    if len(arguments) > 3 or any(argument.startswith("-") for argument in arguments):
-        print("usage: make_ssp.py [RIG.json] [OUT.ssp] [FINGER.json]", file=sys.stderr)
-        return 2
-    rig = Path(arguments[0]) if arguments else RIG
-    output = Path(arguments[1]) if len(arguments) > 1 else Path("finger.ssp")
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("rig", type=Path, nargs="?", default=RIG, metavar="RIG.json")
+    parser.add_argument("output", type=Path, nargs="?", default=Path("finger.ssp"), metavar="OUT.ssp")
+    parser.add_argument("finger", type=Path, nargs="?", metavar="FINGER.json")
+    given = parser.parse_args()
     try:
-        build_ssp(rig, output, Path(arguments[2]) if len(arguments) > 2 else None)
+        build_ssp(given.rig, given.output, given.finger)
     except InputError as refused:
-        print(f"make_ssp.py: {refused}", file=sys.stderr)
-        return 2
-    print(f"{output}: {output.stat().st_size / 1024:.0f} KiB")
-    return 0
+        parser.error(str(refused))
+    print(f"{given.output}: {given.output.stat().st_size / 1024:.0f} KiB")
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    main()

@@ -5,9 +5,8 @@ python step_by_hand.py FINGER.ssp [SECONDS]     prints torques and contact at th
 
 from __future__ import annotations
 
-import math
+import argparse
 import shutil
-import sys
 import tempfile
 import zipfile
 from collections.abc import Sequence
@@ -16,31 +15,24 @@ from typing import Any
 
 import fmpy
 import numpy as np
-from fmpy.fmi2 import FMU2Slave
 from numpy.typing import NDArray
 
 STEP = 0.001  # s
 LONGEST = 3600.0  # s
-COMPONENTS = {"plant": "TendonFinger.fmu", "friction": "friction.fmu"}
+COMPONENTS = ("TendonFinger.fmu", "friction.fmu")
 
 
 class Component:
     """One FMU of the package in initialisation mode."""
 
-    def __init__(self, name: str, fmu: Path) -> None:
+    def __init__(self, fmu: Path) -> None:
         self._folder = fmpy.extract(str(fmu))
         description = fmpy.read_model_description(self._folder, validate=False)
         self._vr = {variable.name: variable.valueReference for variable in description.modelVariables}
         self.inputs = [v.name for v in description.modelVariables if v.causality == "input" and v.type == "Real"]
         self.outputs = [v.name for v in description.modelVariables if v.causality == "output" and v.type == "Real"]
         self.flags = [v.name for v in description.modelVariables if v.causality == "output" and v.type == "Boolean"]
-        self.fmu = FMU2Slave(
-            guid=description.guid,
-            unzipDirectory=self._folder,
-            modelIdentifier=description.coSimulation.modelIdentifier,
-            instanceName=name,
-        )
-        self.fmu.instantiate()
+        self.fmu = fmpy.instantiate_fmu(self._folder, description, "CoSimulation")
         self.fmu.setupExperiment(startTime=0.0)
         self.fmu.enterInitializationMode()
 
@@ -67,13 +59,9 @@ def run(package: Path, steps: int, *, sequential: bool = False, blind_start: boo
     sequential: the plant steps first, and the friction FMU takes the sample of that same time: no coupling delay.
     blind_start: the friction FMU starts from inputs of 0, as in fmpy's `simulate_ssp` without start values.
     """
-    folder = Path(tempfile.mkdtemp(prefix="step-by-hand-"))
-    with zipfile.ZipFile(package) as archive:
+    with tempfile.TemporaryDirectory() as folder, zipfile.ZipFile(package) as archive:
         archive.extractall(folder)
-    try:
-        plant, friction = (Component(name, folder / "resources" / fmu) for name, fmu in COMPONENTS.items())
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
+        plant, friction = (Component(Path(folder, "resources", fmu)) for fmu in COMPONENTS)
     coupled = friction.inputs
     sample = [0.0] * len(coupled) if blind_start else plant.get(coupled)
     friction.set(coupled, sample)
@@ -100,25 +88,6 @@ def run(package: Path, steps: int, *, sequential: bool = False, blind_start: boo
     return dict(zip(names, np.array(rows).T, strict=True))
 
 
-def read_arguments(arguments: list[str]) -> tuple[Path, int]:
-    """Package and number of steps. Raises ValueError."""
-    package = Path(arguments[0])
-    if not zipfile.is_zipfile(package):
-        raise ValueError(f"{package}: {'no SSP package' if package.exists() else 'no such file'}; see make_ssp.py")
-    with zipfile.ZipFile(package) as archive:
-        missing = {f"resources/{fmu}" for fmu in COMPONENTS.values()} - set(archive.namelist())
-    if missing:
-        raise ValueError(f"{package}: holds no {min(missing)}; expected a package of make_ssp.py")
-    text = arguments[1] if len(arguments) > 1 else "2"
-    try:
-        seconds = float(text)
-    except ValueError:
-        seconds = math.nan
-    if not STEP <= seconds <= LONGEST:
-        raise ValueError(f"SECONDS = {text}: expected a number from {STEP:g} to {LONGEST:g}")
-    return package, round(seconds / STEP)
-
-
 def show(table: dict[str, NDArray[Any]]) -> None:
     """A row each tenth of a second; of contact, whether the friction FMU detects one and whether there is one."""
     joints = sum(name.startswith("friction.compensated_torque[") for name in table)
@@ -134,18 +103,19 @@ def show(table: dict[str, NDArray[Any]]) -> None:
         print("   ".join([f"{table['time'][k]:6.3f}", " ".join(contact), *torques]))
 
 
-def main(arguments: list[str]) -> int:
-    if not 1 <= len(arguments) <= 2:
-        print("usage: step_by_hand.py FINGER.ssp [SECONDS]", file=sys.stderr)
-        return 2
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("package", type=Path, metavar="FINGER.ssp", help="package of make_ssp.py")
+    parser.add_argument("seconds", type=float, nargs="?", default=2.0, metavar="SECONDS")
+    given = parser.parse_args()
+    if not STEP <= given.seconds <= LONGEST:
+        parser.error(f"SECONDS = {given.seconds}: expected a number from {STEP:g} to {LONGEST:g}")
     try:
-        package, steps = read_arguments(arguments)
-    except (ValueError, OSError) as refused:
-        print(f"step_by_hand.py: {refused}", file=sys.stderr)
-        return 2
-    show(run(package, steps))
-    return 0
+        table = run(given.package, round(given.seconds / STEP))
+    except (OSError, zipfile.BadZipFile) as wrong:
+        parser.error(f"{wrong}: expected a package of make_ssp.py")
+    show(table)
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    main()

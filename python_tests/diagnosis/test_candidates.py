@@ -21,8 +21,8 @@ from tendonfmu.diagnosis.effects import MECHANISMS, Place, Variant, by_name
 from tendonfmu.diagnosis.effects.mechanism import add_to_number
 from tendonfmu.diagnosis.extension_fit import carried, number_columns
 from tendonfmu.diagnosis.samples import Samples, Span, span_of
+from tendonfmu.excite.excitation import balanced_forces
 from tendonfmu.model import native, own_copy
-from tendonfmu.model.balance import balanced_forces
 from tendonfmu.model.description import Finger, finger_of
 from tendonfmu.model.friction_places import friction_numbers, moment_arms
 from tendonfmu.recordings.prepared import FitRecording, Held, prepare

@@ -27,9 +27,9 @@ from tendonfmu.diagnosis.motion import discriminating_motion, expected_recording
 from tendonfmu.diagnosis.next_experiment import Experiments, Question, plan_experiments
 from tendonfmu.diagnosis.samples import Samples, exact_model
 from tendonfmu.errors import InputError
+from tendonfmu.excite.excitation import pretension_vector
 from tendonfmu.files.json_node import Node
 from tendonfmu.files.tables import write_table
-from tendonfmu.model.balance import pretension_vector
 from tendonfmu.model.friction_places import moment_arms
 from tendonfmu.recordings.prepared import FitRecording
 from tendonfmu.simulate.motion_plan import Joints, expand_motion

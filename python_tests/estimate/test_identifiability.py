@@ -11,10 +11,9 @@ import pytest
 
 from excite_fingers import SMALL, SMALL_RANGES
 from tendonfmu.estimate.fisher_information import information, noise_of, sensitivities
-from tendonfmu.excite.excitation import Plan, plan_excitation
+from tendonfmu.excite.excitation import Plan, balanced_forces, plan_excitation
 from tendonfmu.excite.training_motion import as_array, excite, find_ranges, read_subject, report
 from tendonfmu.model import native
-from tendonfmu.model.balance import balanced_forces
 from tendonfmu.model.description import finger_of
 from tendonfmu.model.friction_places import friction_numbers
 

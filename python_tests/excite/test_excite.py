@@ -15,12 +15,18 @@ from command import Call
 from excite_fingers import INDEX, INDEX_DATA, INDEX_RANGES, SMALL, SMALL_RANGES
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.identifiability import EffectCoverage, coverage_of, durations
-from tendonfmu.excite.excitation import ACCELERATION, Excitation, Plan, Variation, plan_excitation
+from tendonfmu.excite.excitation import (
+    ACCELERATION,
+    Excitation,
+    Plan,
+    Variation,
+    evaluate_quintic,
+    plan_excitation,
+    pretension_vector,
+)
 from tendonfmu.excite.training_motion import as_array, find_pretensions, find_ranges, read_subject
 from tendonfmu.files.tables import read_table
-from tendonfmu.model.balance import pretension_vector
 from tendonfmu.model.friction_places import effects, moment_arms, working_point_weights
-from tendonfmu.statistics.quintic import evaluate
 
 
 @pytest.fixture(scope="module")
@@ -54,10 +60,10 @@ def test_quintic_agrees_with_scipy() -> None:
     knots = np.column_stack([np.cumsum(random.uniform(0.1, 2, 9)), random.normal(size=(9, 3))])
     time = random.uniform(knots[0, 0], knots[-1, 0], 500)
     reference = BPoly.from_derivatives(knots[:, 0], knots[:, 1:])
-    for order, found in enumerate(evaluate(knots, time)):
+    for order, found in enumerate(evaluate_quintic(knots, time)):
         np.testing.assert_allclose(found, reference.derivative(order)(time) if order else reference(time), atol=1e-9)
     knots = np.array([[1.0, 0.2, 0.0, 0.0], [2.0, 0.7, 0.0, 0.0]])  # constant outside
-    np.testing.assert_array_equal(evaluate(knots, np.array([0.0, 1.0, 2.0, 5.0]))[0], [0.2, 0.2, 0.7, 0.7])
+    np.testing.assert_array_equal(evaluate_quintic(knots, np.array([0.0, 1.0, 2.0, 5.0]))[0], [0.2, 0.2, 0.7, 0.7])
 
 
 def test_limits_hold_between_rows(motion: Excitation) -> None:
@@ -66,7 +72,7 @@ def test_limits_hold_between_rows(motion: Excitation) -> None:
     for planned, ranges, speed in ((motion, INDEX_RANGES, 1.0), (other, SMALL_RANGES, 3.0)):
         time = np.linspace(0, planned.time[-1], 100_000)
         for knots, (low, high) in zip(planned.knots, ranges, strict=True):
-            position, velocity, acceleration = evaluate(knots, time)
+            position, velocity, acceleration = evaluate_quintic(knots, time)
             assert position.min() >= low - 1e-12 and position.max() <= high + 1e-12
             assert np.abs(velocity).max() <= speed + 1e-9
             assert np.abs(acceleration).max() <= ACCELERATION + 1e-9
@@ -79,7 +85,9 @@ def test_rows_reproduce_the_motion(motion: Excitation) -> None:
         rows = np.column_stack(
             [motion.time, *(getattr(motion, f"joint_{of}")[:, j] for of in ("position", "velocity", "acceleration"))]
         )
-        for found, expected, size in zip(evaluate(rows, time), evaluate(knots, time), (1, 100, 1e4), strict=True):
+        for found, expected, size in zip(
+            evaluate_quintic(rows, time), evaluate_quintic(knots, time), (1, 100, 1e4), strict=True
+        ):
             np.testing.assert_allclose(found, expected, atol=1e-13 * size)
 
 

@@ -63,9 +63,12 @@ def test_arms_springs_and_friction_are_those_of_the_model(tmp_path: Path, angle:
 
 
 def test_all_that_is_left_out_is_named(tmp_path: Path) -> None:
-    text = "\n".join(imported(tmp_path, fixed_model(gravity=-9.81)).left_out)
+    sprung = fixed_model(gravity=-9.81).replace('<fixed name="short"', '<fixed name="short" stiffness="50"')
+    text = "\n".join(imported(tmp_path, sprung).left_out)
     for words in (
         "tendon spring: without a drive",
+        "tendon short: spring 50 N/m; moves the joints beside the drive",
+        "tendon back: damping 3 N·s/m, armature 0.01 kg; moves the joints beside the drive",
         "actuator direct: drives joint pip without a tendon",
         "constraint coupled: couples joint pip and mcp",
         "weight of the links, at most (mN·m): mcp ",
@@ -73,7 +76,7 @@ def test_all_that_is_left_out_is_named(tmp_path: Path) -> None:
         "inertia that couples the joints",
     ):
         assert words in text, text
-    assert "elsewhere" not in text and "thumb" not in text  # of another finger
+    assert "tendon deep" not in text and "elsewhere" not in text and "thumb" not in text  # of another finger
 
 
 def test_constant_arms_are_those_of_mujoco_s_lengths(tmp_path: Path) -> None:

@@ -195,7 +195,7 @@ def test_control_loop_of_the_examples_feels_the_pushes_of_the_demo_recording(
     onsets = recorded["time"].to_numpy()[1:][pushed[1:] & ~pushed[:-1]] - recorded["time"][0]
     recorded.to_csv(tmp_path / "pushes.csv", index=False)
     calibrated = folder / "index_finger_calibrated.json"
-    begins, _ = contacts(call(control_loop, calibrated, "--recording", tmp_path / "pushes.csv", "--no-wait"))
+    begins, _ = contacts(call(control_loop, calibrated, tmp_path / "pushes.csv", "--no-wait"))
     assert len(begins) == len(onsets) == 11
     # labels begin at 50 mN
     assert all(-0.02 <= begin - onset < 0.5 for begin, onset in zip(begins, onsets, strict=True))

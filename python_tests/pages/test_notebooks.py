@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import os
 import re
+import shutil
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
+import nbformat
 import pytest
 
 from repository_paths import ROOT
-
-sys.path.append(str(ROOT / "tools"))
 
 NOTEBOOKS = sorted((ROOT / "examples" / "notebooks").glob("*.ipynb"))
 FIGURE = "application/vnd.plotly.v1+json"
@@ -36,15 +38,21 @@ def printed(outputs: list[Any]) -> str:
     return "".join(each["text"] for each in outputs if each.get("name") == "stdout")
 
 
-@pytest.fixture(scope="module")
-def run_notebook() -> Any:
-    from run_notebooks import run_notebook
-
-    return run_notebook
+def run_notebook(file: Path, folder: Path) -> Any:
+    """The notebook with its outputs; what it writes is in folder/notebooks."""
+    notebook = folder / "notebooks" / file.name
+    notebook.parent.mkdir()
+    shutil.copy(file, notebook)
+    for name in ("demo_recording", "fingers"):
+        (folder / name).symlink_to(ROOT / "examples" / name, target_is_directory=True)
+    program = Path(sys.executable).with_name("jupyter")
+    settings = {**os.environ, "PLOTLY_RENDERER": "plotly_mimetype"}
+    subprocess.run([program, "execute", "--inplace", "--timeout=600", notebook], env=settings, check=True)
+    return nbformat.read(notebook, as_version=4)
 
 
 @pytest.mark.long
-def test_run_and_fit(run_notebook: Any, tmp_path: Path) -> None:
+def test_run_and_fit(tmp_path: Path) -> None:
     found = outputs_of(run_notebook(NOTEBOOKS[0], tmp_path))
     assert "<svg" in found["finger"][0]["data"]["text/html"]
     assert {trace["name"] for trace in figures_of(found["run"])[0]["data"]} == {"pulled", "friction", "compensated"}
@@ -58,7 +66,7 @@ def test_run_and_fit(run_notebook: Any, tmp_path: Path) -> None:
 
 
 @pytest.mark.long
-def test_diagnose_and_extend(run_notebook: Any, tmp_path: Path) -> None:
+def test_diagnose_and_extend(tmp_path: Path) -> None:
     found = outputs_of(run_notebook(NOTEBOOKS[1], tmp_path))
     hidden = table_of(found["truth"])
     size = re.search(r"weight at joint (\d): ([\d.]+)\s*mN·m", printed(found["causes"]))
@@ -74,7 +82,7 @@ def test_diagnose_and_extend(run_notebook: Any, tmp_path: Path) -> None:
 
 
 @pytest.mark.long
-def test_detect_and_tune(run_notebook: Any, tmp_path: Path) -> None:
+def test_detect_and_tune(tmp_path: Path) -> None:
     found = outputs_of(run_notebook(NOTEBOOKS[2], tmp_path))
     assert len(figures_of(found["plot"])[0]["layout"]["shapes"]) >= 4 * 2 * 11
     assert any("for 6 an hour record 21.1 min more" in each.get("text", "") for each in found["tune"])

@@ -151,7 +151,7 @@ def test_a_friction_fmu_that_starts_in_motion_has_no_false_contact(tmp_path: Pat
         build_ssp(ROOT / "examples/rigs/index_finger_pushes.json", tmp_path / "finger.ssp")
     ) as archive:
         archive.extractall(tmp_path)
-    plant, friction = (hand.Component(name, tmp_path / "resources" / fmu) for name, fmu in hand.COMPONENTS.items())
+    plant, friction = (hand.Component(tmp_path / "resources" / fmu) for fmu in hand.COMPONENTS)
     plant.fmu.exitInitializationMode()
     plant.fmu.doStep(0.0, 1.5)
     friction.set(friction.inputs, plant.get(friction.inputs))

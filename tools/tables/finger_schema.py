@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from facts import Facts, Row, is_list, last, of, plain, symbol
@@ -12,6 +12,7 @@ Schema = dict[str, Any]
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 NAME: Schema = {"type": "string", "minLength": 1, "maxLength": 200, "pattern": "^[^\\u0000-\\u001f\\u007f]*$"}
 NULL: Schema = {"type": "null"}
+NO_RULES: Mapping[str, Any] = {}
 LAW = "F(v) = sgn(v)·(coulomb + (static − coulomb)·exp(−|v|/stribeck_velocity) + viscous·|v|), static >= coulomb"
 
 # What must hold between keys; the reader in runtime/description/description_reader.cpp has the same in C++.
@@ -79,6 +80,25 @@ def number_of(row: Row, nullable: bool) -> Schema:
     return {"type": [kind, "null"] if nullable else kind, **lower, "maximum": row["most"]}
 
 
+def object_of(
+    properties: Schema,
+    required: Sequence[str] = (),
+    text: str = "",
+    *,
+    nullable: bool = False,
+    rules: Mapping[str, Any] = NO_RULES,
+) -> Schema:
+    """An object that has no other keys."""
+    return {
+        **({"description": text} if text else {}),
+        "type": ["object", "null"] if nullable else "object",
+        **rules,
+        **({"required": list(required)} if required else {}),
+        "additionalProperties": False,
+        "properties": properties,
+    }
+
+
 def list_of(length: tuple[int, int], items: Schema, nullable: bool) -> Schema:
     return {
         "type": ["array", "null"] if nullable else "array",
@@ -139,14 +159,9 @@ def _of_key(facts: Facts, row: Row) -> Schema:
 def _object(facts: Facts, row: Row) -> Schema:
     children = facts.children(plain(row["path"]))
     needed = [last(child["path"]) for child in children if "required" in child]
-    return {
-        **({"description": row["text"]} if "text" in row else {}),
-        "type": "object" if "required" in row or not row["path"] else ["object", "null"],
-        **RULES.get(row["path"], {}),
-        **({"required": needed} if needed else {}),
-        "additionalProperties": False,
-        "properties": {last(child["path"]): _of_key(facts, child) for child in children},
-    }
+    properties = {last(child["path"]): _of_key(facts, child) for child in children}
+    nullable = "required" not in row and bool(row["path"])
+    return object_of(properties, needed, row.get("text", ""), nullable=nullable, rules=RULES.get(row["path"], NO_RULES))
 
 
 # --- laws and extensions ----------------------------------------------------------------------------------------------
@@ -163,12 +178,7 @@ def _laws(facts: Facts) -> Schema:
         }
         for number in numbers
     ]
-    side = {
-        "type": "object",
-        "required": [number["key"] for number in numbers if "required" in number],
-        "additionalProperties": False,
-        "properties": dict(zip(keys, sides, strict=True)),
-    }
+    side = object_of(dict(zip(keys, sides, strict=True)), [number["key"] for number in numbers if "required" in number])
     angles = facts.of_item("EDGE_ANGLES")[0]
     asymmetric = {name: {"$ref": "#/$defs/side"} for name in ("positive", "negative")}
     return {
@@ -178,27 +188,21 @@ def _laws(facts: Facts) -> Schema:
             **side,
             "properties": {**side["properties"], "positive": NULL, "negative": NULL},
         },
-        "asymmetric_law": {
-            "description": "One side for each direction of motion",
-            "type": "object",
-            "required": ["positive", "negative"],
-            "additionalProperties": False,
-            "properties": asymmetric | dict.fromkeys(keys, NULL),
-        },
+        "asymmetric_law": object_of(
+            asymmetric | dict.fromkeys(keys, NULL), list(asymmetric), "One side for each direction of motion"
+        ),
         "law": {"anyOf": [{"$ref": "#/$defs/symmetric_law"}, {"$ref": "#/$defs/asymmetric_law"}]},
         "optional_law": {"anyOf": [NULL, {"$ref": "#/$defs/law"}]},
         "edge": {"anyOf": [{"$ref": "#/$defs/optional_law"}, {"$ref": "#/$defs/working_points"}]},
-        "working_points": {
-            "description": "Laws at angles of the joint before; values are interpolated between them, constant outside",
-            "type": "object",
-            "required": ["angles", "laws"],
-            "additionalProperties": False,
-            "properties": {
+        "working_points": object_of(
+            {
                 "angles": _of_number(facts, angles),
                 "laws": list_of((1, limits["points"]), {"$ref": "#/$defs/law"}, nullable=False),
-                **dict.fromkeys([*keys, "positive", "negative"], NULL),
+                **dict.fromkeys([*keys, *asymmetric], NULL),
             },
-        },
+            ["angles", "laws"],
+            "Laws at angles of the joint before; values are interpolated between them, constant outside",
+        ),
     }
 
 
@@ -231,11 +235,7 @@ def _effect(facts: Facts, effect: Row) -> Schema:
         }
         for number in effect["numbers"]
     }
-    return {
-        "description": effect["text"],
-        "type": "object",
-        "required": ["effect", *needed],
-        **PLACES.get(effect.get("rule", ""), {}),
-        "additionalProperties": False,
-        "properties": {"effect": {"const": effect["name"]}, **place, **numbers},
-    }
+    properties = {"effect": {"const": effect["name"]}, **place, **numbers}
+    return object_of(
+        properties, ["effect", *needed], effect["text"], rules=PLACES.get(effect.get("rule", ""), NO_RULES)
+    )

@@ -20,8 +20,7 @@ from typing import Any
 from facts import ROOT, Facts, Row, is_list, last, of, parent, plain, range_of, read_facts, symbol
 from finger_schema import DIALECT, documented, finger_schema, units_of
 from jinja2 import Environment, FileSystemLoader
-from rig_keys import rig_sections
-from rig_schema import rig_schema
+from rig_schema import rig_schema, rig_sections
 from typed_schema import Types
 
 COMMAND = "python tools/tables/generate.py"

@@ -13,8 +13,7 @@ from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
 from facts import ROOT
-
-Schema = dict[str, Any]
+from finger_schema import Schema, object_of
 
 PACKAGE = ROOT / "python" / "tendonfmu"
 KINDS = {str: "string", int: "integer", float: "number", bool: "boolean", type(None): "null"}
@@ -90,13 +89,7 @@ class Types:
             properties[key] = ({"description": said} if said else {}) | self._of(of, defs)
         doc = " ".join((ast.get_docstring(self._classes[name][0]) or "").split())
         required = [key for key in properties if key not in optional]
-        return {
-            **({"description": doc} if doc else {}),
-            "type": "object",
-            **({"required": required} if required else {}),
-            "additionalProperties": False,
-            "properties": properties,
-        }
+        return object_of(properties, required, doc)
 
     def _keys(self, name: str) -> Iterator[tuple[str, Any, str]]:
         """(key, type, comment), those of the bases first."""

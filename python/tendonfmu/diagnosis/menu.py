@@ -15,9 +15,9 @@ import numpy as np
 from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.samples import Span
 from tendonfmu.errors import InputError
-from tendonfmu.excite import Variation
+from tendonfmu.excite import Variation, pretension_vector
 from tendonfmu.files import listed
-from tendonfmu.model import moment_arms, pretension_vector
+from tendonfmu.model import moment_arms
 
 LEVELS = (0.5, 1.0, 2.0, 4.0)  # of the pretension that was recorded
 SLOW, FAST = 0.2, 2.5  # of the speed that was recorded

@@ -16,10 +16,9 @@ import numpy as np
 from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.menu import Entry, Section, entry_from_json, own_tension
 from tendonfmu.errors import InputError
-from tendonfmu.excite import Excitation, Plan, plan_excitation
-from tendonfmu.model import balanced_forces, finger_of, moment_arms, tendon_positions
+from tendonfmu.excite import Excitation, Plan, balanced_forces, evaluate_quintic, plan_excitation
+from tendonfmu.model import finger_of, moment_arms, tendon_positions
 from tendonfmu.recordings import FitRecording, Recording, run_parts
-from tendonfmu.statistics import quintic
 
 _SAMPLED = (
     *("joint_position", "joint_velocity", "joint_acceleration"),
@@ -126,7 +125,7 @@ def _passage(data: Data, before: Excitation, after: Excitation, speed: float, ra
 
 def _stroke(start: Numbers, end: Numbers, seconds: float, time: Numbers) -> tuple[Numbers, Numbers, Numbers]:
     """Return quintics from rest to rest with their first and second derivatives [K, n]."""
-    share, slope, bend = quintic.evaluate(np.array([[0.0, 0.0, 0.0, 0.0], [seconds, 1.0, 0.0, 0.0]]), time)
+    share, slope, bend = evaluate_quintic(np.array([[0.0, 0.0, 0.0, 0.0], [seconds, 1.0, 0.0, 0.0]]), time)
     share, slope, bend = (values if np.ndim(start) == 0 else values[:, None] for values in (share, slope, bend))
     return start + share * (end - start), slope * (end - start), bend * (end - start)
 

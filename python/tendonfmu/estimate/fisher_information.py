@@ -19,7 +19,6 @@ from tendonfmu.model import (
     DEFAULTS,
     Finger,
     Number,
-    friction_probe,
     native,
     number_of,
 )
@@ -31,6 +30,13 @@ _ELEMENTS = 4_000_000  # sensitivities in memory at a time
 
 
 # --- sensitivities ----------------------------------------------------------------------------------------------------
+
+
+def friction_probe(finger: Finger) -> native.Instance:
+    """Make a finger that computes the friction model only."""
+    probe = finger.steady.instance(3)
+    probe.set({"bias.forget_rate": number_of(finger.data, "bias.forget_rate")})
+    return probe
 
 
 def _sign(number: Number) -> int:

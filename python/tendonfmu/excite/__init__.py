@@ -9,7 +9,15 @@ from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from . import training_motion
-    from .excitation import Excitation, Plan, Variation, plan_excitation
+    from .excitation import (
+        Excitation,
+        Plan,
+        Variation,
+        balanced_forces,
+        evaluate_quintic,
+        plan_excitation,
+        pretension_vector,
+    )
     from .training_motion import ExciteResult, read_subject
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

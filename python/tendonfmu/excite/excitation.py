@@ -9,7 +9,7 @@ speed and slows down, in quintic pieces whose ends lie on rows.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -17,9 +17,9 @@ import numpy as np
 
 from tendonfmu.arrays import Data, Flags, Numbers
 from tendonfmu.errors import InputError
+from tendonfmu.estimate import friction_probe
 from tendonfmu.files import counted
-from tendonfmu.model import moment_arms, pretension_vector, tendon_positions
-from tendonfmu.statistics import quintic
+from tendonfmu.model import Finger, moment_arms, tendon_positions
 
 START = 2.0  # s; all joints are at rest at the beginning of a block, while the pretension changes
 END = 1.0  # s; all joints are at rest at the end of a block
@@ -233,7 +233,7 @@ def _sample(
     data: Data, plan: Plan, knots: list[Numbers], strokes: list[list[Stroke]], blocks: list[tuple[int, int, float]]
 ) -> Excitation:
     time = np.arange(blocks[-1][1] + 1) / plan.rate
-    curves = [quintic.evaluate(path, time) for path in knots]
+    curves = [evaluate_quintic(path, time) for path in knots]
     position, velocity, acceleration = (np.column_stack([curve[k] for curve in curves]) for k in range(3))
     if plan.vary is not None:
         tension = internal_tensions(data, plan.vary, time, plan.seed)
@@ -263,7 +263,7 @@ def _pretension(plan: Plan, blocks: list[tuple[int, int, float]], time: Numbers)
         change = round(PRETENSION_CHANGE * plan.rate)
         level = np.vstack([level, [begin, before, 0.0, 0.0], [begin + change, now, 0.0, 0.0]])
     level[:, 0] /= plan.rate
-    pretension, _, _ = quintic.evaluate(level, time)
+    pretension, _, _ = evaluate_quintic(level, time)
     return pretension
 
 
@@ -292,7 +292,7 @@ def _series(values: Numbers, every: float, time: Numbers) -> Numbers:
     knots = np.zeros((2 * len(begin) + 1, 4))
     knots[1::2, 0], knots[2::2, 0] = begin, begin + PATTERN_CHANGE
     knots[0, 1], knots[1::2, 1], knots[2::2, 1] = values[0], values[:-1], values[1:]
-    tension, _, _ = quintic.evaluate(knots, time)
+    tension, _, _ = evaluate_quintic(knots, time)
     return tension
 
 
@@ -337,3 +337,82 @@ class _Patterns:
         way = tension - self._even
         room = np.where(way > 0, self._high - self._even, self._even - self._low)
         return self._even + way * min(1.0, float(np.min(room / np.maximum(np.abs(way), 1e-12))))
+
+
+# --- quintic pieces between knots -------------------------------------------------------------------------------------
+# Each piece is the polynomial of degree 5 with position, velocity and acceleration of both its knots (quintic Hermite).
+# Outside the knots the position is constant.
+
+
+def evaluate_quintic(knots: Numbers, time: Numbers) -> tuple[Numbers, Numbers, Numbers]:
+    """Evaluate a piecewise quintic curve and its derivatives. knots: [k, 4] (rad); time: [N] (s); returns [N]."""
+    if len(knots) == 1:
+        return np.full(len(time), knots[0, 1]), np.zeros(len(time)), np.zeros(len(time))
+    piece = np.clip(np.searchsorted(knots[:, 0], time, side="right") - 1, 0, len(knots) - 2)
+    begin, end = knots[:-1][piece].T, knots[1:][piece].T
+    h = end[0] - begin[0]
+    u = np.clip((time - begin[0]) / h, 0.0, 1.0)
+    v0, v1 = begin[2] * h, end[2] * h
+    a0, a1 = begin[3] * h * h / 2, end[3] * h * h / 2
+    rise = end[1] - begin[1] - v0 - a0  # the cubic and higher terms add up to this at u = 1
+    slope, bend = v1 - v0 - 2 * a0, a1 - a0
+    c3, c4, c5 = 10 * rise - 4 * slope + bend, -15 * rise + 7 * slope - 2 * bend, 6 * rise - 3 * slope + bend
+    position = begin[1] + u * (v0 + u * (a0 + u * (c3 + u * (c4 + u * c5))))
+    velocity = (v0 + u * (2 * a0 + u * (3 * c3 + u * (4 * c4 + u * 5 * c5)))) / h
+    acceleration = (2 * a0 + u * (6 * c3 + u * (12 * c4 + u * 20 * c5))) / (h * h)
+    # exactly the last knot, without rounding errors
+    position, velocity, acceleration = (
+        np.where(u < 1, inside, last) for inside, last in zip((position, velocity, acceleration), end[1:], strict=True)
+    )
+    outside = (time < knots[0, 0]) | (time > knots[-1, 0])
+    return position, np.where(outside, 0.0, velocity), np.where(outside, 0.0, acceleration)
+
+
+# --- forces that carry the friction of a motion -----------------------------------------------------------------------
+# In quasi-static balance Rᵀ f0 = T (eq. 12): the forces are a pretension that balances itself, and what carries
+# friction.
+
+
+LEAST_SHARE = 0.05  # of the mean; keeps every pulling tendon taut
+_BALANCE_SWEEPS = 20000
+_ITERATIONS = 8  # each reduces the error to the share of the force that friction takes, some percent
+
+
+def pretension_vector(data: Data) -> Numbers:
+    """Return the tendon forces [m] per newton of pretension."""
+    arms = moment_arms(data)
+    pulls = np.array([not tendon.get("bidirectional") for tendon in data["tendons"]])
+    project = np.eye(len(arms)) - arms @ np.linalg.pinv(arms)
+    shares = project @ np.ones(len(arms))
+    least = np.where(pulls, LEAST_SHARE, -np.inf)
+    correction = np.zeros(len(arms))
+    for _ in range(_BALANCE_SWEEPS):
+        if np.all(shares >= least * (1 - 1e-9)):
+            break
+        allowed = np.maximum(shares + correction, least)
+        correction += shares - allowed
+        shares = project @ allowed
+    else:
+        raise InputError(
+            "tendons: no balanced pretension; expected moment arms with a solution of "
+            "Rᵀ f = 0 in which every tendon pulls"
+        )
+    mean = float(np.mean(shares))
+    return shares / mean if mean > 1e-9 else np.zeros(len(arms))
+
+
+def balanced_forces(described: Finger, motion: Mapping[str, Numbers], pretension: Numbers) -> Numbers:
+    """Return the tendon forces that carry the friction of a motion: f0 = pretension·ν + (Rᵀ)⁺ T(f0)."""
+    # T is eq. (10) of everything that slides, cover included. Sticking places add nothing, since their share is
+    # unknown.
+    # motion: [N] (s); pretension: [N] (N); returns tendon forces [N, m] (N)
+    data, finger = described.data, friction_probe(described)
+    start = finger.save_state()
+    spread = np.linalg.pinv(moment_arms(data))
+    internal = np.outer(pretension, pretension_vector(data)) if pretension.ndim == 1 else pretension
+    forces = internal
+    for _ in range(_ITERATIONS):
+        finger.restore_state(start)
+        outputs = finger.run({**motion, "tendon_force": forces})
+        forces = internal + (outputs["friction_torque"] - outputs["bias_torque"]) @ spread
+    return np.asarray(forces)

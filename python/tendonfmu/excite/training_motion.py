@@ -17,8 +17,9 @@ import numpy as np
 from tendonfmu import estimate
 from tendonfmu.arrays import Data, Numbers
 from tendonfmu.errors import InputError
+from tendonfmu.excite import balanced_forces, pretension_vector
 from tendonfmu.excite.excitation import SLOW, Excitation, Plan, Stroke, Variation, plan_excitation
-from tendonfmu.model import Finger, balanced_forces, friction_numbers, pretension_vector, read_finger
+from tendonfmu.model import Finger, friction_numbers, read_finger
 from tendonfmu.options import ExciteOptions
 from tendonfmu.simulate import finger_with_limits, is_rig
 

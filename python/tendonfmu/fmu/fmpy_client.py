@@ -12,7 +12,7 @@ import struct
 import tempfile
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -158,7 +158,8 @@ def _steps(time: NDArray[np.float64], at_end: bool) -> Iterator[tuple[float, flo
 class _Slave:
     """What instances of both versions of FMI have. fmpy raises bare exceptions when the FMU refuses a call."""
 
-    _slave: Any
+    def __init__(self, slave: Any) -> None:
+        self._slave = slave
 
     def exit_initialisation(self) -> None:
         self._slave.exitInitializationMode()
@@ -174,26 +175,6 @@ class _Slave2(_Slave):
     """FMI 2.0."""
 
     numbers: ClassVar[Mapping[str, type[np.generic]]] = {"Real": np.float64, "Boolean": np.int32, "Integer": np.int32}
-
-    def __init__(self, **facts: Any) -> None:
-        from fmpy.fmi2 import FMU2Slave
-
-        self._slave = FMU2Slave(**facts)
-
-    def instantiate(self, log: Callable[[int, bytes], None]) -> None:
-        from fmpy import calloc, free
-        from fmpy.fmi2 import (
-            fmi2CallbackAllocateMemoryTYPE,
-            fmi2CallbackFreeMemoryTYPE,
-            fmi2CallbackFunctions,
-            fmi2CallbackLoggerTYPE,
-        )
-
-        self._callbacks = fmi2CallbackFunctions()
-        self._callbacks.logger = fmi2CallbackLoggerTYPE(lambda _e, _name, status, _c, text: log(status, text))
-        self._callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
-        self._callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
-        self._slave.instantiate(callbacks=self._callbacks, loggingOn=True)
 
     def initialise(self, start: float, reference: int, value: int) -> None:
         """Write a whole number by its value reference, and enter the initialisation mode."""
@@ -220,13 +201,8 @@ class _Slave3(_Slave):
 
     numbers: ClassVar[Mapping[str, type[np.generic]]] = {"Real": np.float64, "Boolean": np.bool_, "Integer": np.int32}
 
-    def __init__(self, **facts: Any) -> None:
-        from fmpy.fmi3 import FMU3Slave
-
-        self._slave = FMU3Slave(**facts)
-
-    def instantiate(self, log: Callable[[int, bytes], None]) -> None:
-        self._slave.instantiate(loggingOn=True, logMessage=lambda _e, status, _c, text: log(status, text))
+    def __init__(self, slave: Any) -> None:
+        super().__init__(slave)
         flags = [ctypes.c_bool() for _ in range(3)]
         self._answers = (*map(ctypes.byref, flags), ctypes.byref(ctypes.c_double()))
 
@@ -254,8 +230,9 @@ class _Run:
         self.path = path
         self._at = str(path)  # place in error messages: the FMU, later the recording's row
         self._messages: list[str] = []
-        description = _description_of(path, folder)
+        self._folder, self._description = folder, _description_of(path, folder)
         self._at_end = _samples_at_end(folder)
+        description = self._description
         slaves: dict[str, type[_Slave2 | _Slave3]] = {"2": _Slave2, "3": _Slave3}
         slave = slaves.get(str(description.fmiVersion).partition(".")[0])
         if slave is None or description.coSimulation is None:
@@ -265,21 +242,7 @@ class _Run:
         optional = (*OPTIONAL_NUMBERS, *PLACE, *SENSORS)
         self._outputs = {name: self._group(name) for name in wanted if name not in optional or self._has(name)}
         self._inputs = {group: self._group(group) for group in INPUTS}
-        before = Path.cwd()
-        try:
-            self._slave: _Slave2 | _Slave3 = slave(
-                guid=description.guid,
-                unzipDirectory=str(folder),
-                modelIdentifier=description.coSimulation.modelIdentifier,
-                instanceName=description.modelName,
-            )
-        except (InputError, TypeError, AttributeError, NameError, AssertionError, MemoryError):
-            raise
-        # no library for this system, or none that can be loaded: fmpy raises bare exceptions
-        except Exception as error:
-            raise InputError(f"{path}: not an FMU ({_one_line(error).replace(str(folder), '')})") from None
-        finally:
-            os.chdir(before)  # fmpy loads a library in its folder, and stays there if that fails
+        self._kind = slave
 
     @property
     def joints(self) -> int:
@@ -327,34 +290,54 @@ class _Run:
             reason = self._messages[-1] if self._messages else str(error)
             raise InputError(f"{self._at}: {reason}") from None
 
-    def _log(self, status: int, message: bytes) -> None:
+    def _log(self, *call: Any) -> None:
+        """Keep an error: the last of a call are the status, a category and the text."""
+        status, _, text = call[-3:]
         if status > 1:
-            self._messages.append(message.decode("utf-8", "replace").replace("%%", "%"))
+            self._messages.append(text.decode("utf-8", "replace").replace("%%", "%"))
 
-    def _initialise(self, start: float, source: int) -> None:
+    def _instance(self) -> _Slave2 | _Slave3:
+        """Load the library and make the instance."""
+        from fmpy import instantiate_fmu
+
+        before = Path.cwd()
+        try:
+            with redirect_stdout(None):
+                slave = instantiate_fmu(
+                    str(self._folder), self._description, "CoSimulation", debug_logging=True, logger=self._log
+                )
+        except (TypeError, AttributeError, NameError, AssertionError, MemoryError):
+            raise
+        # no library for this system, one that cannot be loaded, or a refusal: fmpy raises bare exceptions
+        except Exception as error:
+            reason = f"not an FMU ({_one_line(error).replace(str(self._folder), '')})"
+            raise InputError(f"{self.path}: {self._messages[-1] if self._messages else reason}") from None
+        finally:
+            os.chdir(before)  # fmpy loads a library in its folder, and stays there if that fails
+        return self._kind(slave)
+
+    def _initialise(self, slave: _Slave2 | _Slave3, start: float, source: int) -> None:
         if "kinematics_source" not in self._all:
             raise InputError(
                 f"{self.path}: no parameter kinematics_source; expected a friction FMU of `tendonfmu build`"
             )
-        self._slave.initialise(start, self._all["kinematics_source"].valueReference, source)
+        slave.initialise(start, self._all["kinematics_source"].valueReference, source)
 
     def over(self, recording: Recording, source: int, progress: Progress | None) -> dict[str, NDArray[Any]]:
-        with self._refusals():
-            self._slave.instantiate(self._log)
+        slave = self._instance()
         try:
             with self._refusals():
-                self._initialise(float(recording.time[0]), source)
-                columns = self._step(recording, self.inputs(source), progress)
-                self._slave.terminate()
+                self._initialise(slave, float(recording.time[0]), source)
+                columns = self._step(slave, recording, self.inputs(source), progress)
+                slave.terminate()
         finally:
-            self._slave.free()
+            slave.free()
         ordered = (name for group in self._outputs.values() for name in group.names)
         return {"time": recording.time, **{name: columns[name] for name in ordered}}
 
     def _step(
-        self, recording: Recording, groups: tuple[str, ...], progress: Progress | None
+        self, slave: _Slave2 | _Slave3, recording: Recording, groups: tuple[str, ...], progress: Progress | None
     ) -> dict[str, NDArray[Any]]:
-        slave = self._slave
         samples = np.ascontiguousarray(np.hstack([recording.groups[group] for group in groups]))
         write = slave.writer([vr for group in groups for vr in self._inputs[group].references], samples.shape[1])
         inputs = _rows(samples)

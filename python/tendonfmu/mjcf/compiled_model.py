@@ -138,6 +138,8 @@ class Tendon:
     is_spatial: bool  # whether it runs through sites and around geoms
     stiffness: float  # (N/m)
     frictionloss: float  # (N)
+    damping: float  # (N·s/m)
+    armature: float  # (kg)
 
 
 @dataclass(frozen=True)
@@ -210,6 +212,8 @@ class CompiledModel:
             is_spatial=spatial,
             stiffness=float(m.tendon_stiffness[k]),
             frictionloss=float(m.tendon_frictionloss[k]),
+            damping=float(m.tendon_damping[k]),
+            armature=float(m.tendon_armature[k]) if hasattr(m, "tendon_armature") else 0.0,  # MuJoCo 3.3 and later
         )
 
     def _actuator(self, k: int) -> Actuator:

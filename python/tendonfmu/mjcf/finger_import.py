@@ -40,8 +40,8 @@ STRIBECK = 0.1  # rad/s; without effect as long as static equals coulomb
 LONGEST_ARM = 0.3  # m; larger coefficients of fixed tendons are no lengths, such as 1 where joints are coupled
 MISSED = 0.02  # share of the largest holding torque that `gravity` rows may miss without a warning
 OF_EVERY_MODEL = (
-    "limits, terms of higher order, damping and armature of tendons, springs beside their drives, shapes and contacts, "
-    "the actuators' dynamics, sensors, keyframes: no part of a description"
+    "limits, terms of higher order, shapes and contacts, the actuators' dynamics, sensors, keyframes: no part of a "
+    "description"
 )
 
 
@@ -364,6 +364,12 @@ def _of_tendons(
         motors = motors_of(model, tendon)
         if tendon.frictionloss and motors:
             yield f"tendon {tendon.name}: frictionloss {tendon.frictionloss:g} N of the spring between motor and finger"
+        driven = any(actuator.tendon == tendon.index for actuator in model.actuators)
+        forces = {"spring": (tendon.stiffness * driven, "N/m"), "damping": (tendon.damping, "N·s/m")}
+        forces["armature"] = (tendon.armature, "kg")
+        beside = ", ".join(f"{what} {size:g} {unit}" for what, (size, unit) in forces.items() if size)
+        if beside:
+            yield f"tendon {tendon.name}: {beside}; moves the joints beside the drive, and no tendon_force shows it"
         for joint in model.joints:
             if joint.velocity not in velocities and moves[tendon.index, joint.velocity] and joint not in motors:
                 yield f"tendon {tendon.name}: also moves joint {joint.name}, which is not in --joints"

@@ -1,7 +1,7 @@
 """What a finger is: its description and the compiled model.
 
 `description` reads a finger description. `native` is the binding of the C runtime; every call of the model goes through
-it. Other modules hold the places of friction (`friction_places`), quasi-static balance (`balance`), extensions, the
+it. Other modules hold the places of friction (`friction_places`), extensions, the
 geometry of the routing, and checks for implausible but valid descriptions (`plausibility`).
 """
 
@@ -11,7 +11,6 @@ from tendonfmu.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from . import native
-    from .balance import balanced_forces, friction_probe, pretension_vector
     from .description import (
         Finger,
         FingerSource,
@@ -72,9 +71,6 @@ if TYPE_CHECKING:
     from .output_names import FLAGS, INPUTS, NUMBERS, OPTIONAL_NUMBERS, PLACE, SENSORS
     from .plausibility import Finding, description_findings, is_direct_drive
     from .routing_geometry import (
-        EDGE_RED,
-        TENDON_COLOURS,
-        FingerDrawing,
         Mark,
         finger_drawing,
         finger_svg,

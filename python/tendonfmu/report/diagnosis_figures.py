@@ -13,8 +13,7 @@ from tendonfmu import drawing as draw
 from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis import Cause, Diagnosis, Evidence, Names, ResidualView, at_place
 from tendonfmu.report.diagnosis_text import names_of, unit_of
-from tendonfmu.report.diagnosis_words import Words, words_of
-from tendonfmu.report.kit import capital
+from tendonfmu.report.kit import Words, capital, words_of
 
 TWO_SIDED = 1.96  # standard errors of a 95 % interval
 _TITLES = {

@@ -20,7 +20,7 @@ from tendonfmu.model import description_text, finger_from_text
 from tendonfmu.report.diagnosis_page import PAGE, diagnosis_page
 from tendonfmu.report.diagnosis_text import names_of
 from tendonfmu.report.diagnosis_types import DiagnosisReport
-from tendonfmu.report.diagnosis_words import words_of
+from tendonfmu.report.kit import words_of
 from tendonfmu.statistics import Interval
 from tendonfmu.tasks import uninterrupted
 

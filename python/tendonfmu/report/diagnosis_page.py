@@ -20,7 +20,6 @@ from tendonfmu.diagnosis import (
 from tendonfmu.files import counted
 from tendonfmu.report import diagnosis_text as texts
 from tendonfmu.report.diagnosis_figures import diagnosis_sheets
-from tendonfmu.report.diagnosis_words import words_of
 from tendonfmu.report.finger_figures import finger_figure
 from tendonfmu.report.kit import (
     Row,
@@ -34,6 +33,7 @@ from tendonfmu.report.kit import (
     render,
     rounded,
     together,
+    words_of,
 )
 
 PAGE = "diagnosis.html"

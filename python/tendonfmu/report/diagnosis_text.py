@@ -28,7 +28,6 @@ from tendonfmu.diagnosis import (
     title_of,
 )
 from tendonfmu.files import counted
-from tendonfmu.report.diagnosis_words import words_of
 from tendonfmu.report.kit import (
     Row,
     Table,
@@ -39,6 +38,7 @@ from tendonfmu.report.kit import (
     rounded,
     together,
     torque_unit,
+    words_of,
 )
 from tendonfmu.statistics import Interval
 

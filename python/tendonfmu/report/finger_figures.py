@@ -14,8 +14,7 @@ from tendonfmu.drawing import BLUE, DARK, SAND, VERMILION, Sheet, curve, mark, p
 from tendonfmu.estimate import known_numbers
 from tendonfmu.files import are, counted, listed
 from tendonfmu.model import Effect, Mark, effects, finger_drawing, finger_svg, keys_of
-from tendonfmu.report.diagnosis_words import words_of
-from tendonfmu.report.kit import capital, rms, rounded, torque_unit
+from tendonfmu.report.kit import capital, rms, rounded, torque_unit, words_of
 
 MOST_MARKS = 8  # of one cause; one at more places is only in the caption
 MOST_PLACES = 12  # whose friction is written on the drawing
