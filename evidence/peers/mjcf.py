@@ -10,7 +10,7 @@ from __future__ import annotations
 import contextlib
 import importlib
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -22,11 +22,13 @@ from evidence.peers.tools import Error, Predict, error_by, learned_signals
 from tendonfmu.arrays import Numbers
 
 mujoco: Any = importlib.import_module("mujoco")
+rollout: Any = importlib.import_module("mujoco.rollout")
 sysid: Any = importlib.import_module("mujoco.sysid")  # mypy would take its stubs for those of mujoco
 
 STEP = 0.002  # s
 ITERATIONS = 10
 SAMPLES = 600  # that inverse dynamics learn from, evenly spread
+WINDOWS, SPAN = 200, 25  # simulated ones, evenly spread; samples of each: 0.5 s
 
 Set = Callable[[Any, float], None]
 
@@ -36,7 +38,8 @@ def passes(case: Case) -> list[tuple[int, int]]:
     return [(int(i), int(j)) for i, j in zip(*np.nonzero(case.arms), strict=True)]
 
 
-def mjcf(case: Case) -> str:
+def mjcf(case: Case, driven: bool = False) -> str:
+    """Driven: motors pull at springs."""
     n = case.arms.shape[1]
     links = [
         f'<body name="link_{j}"><joint name="joint_{j}" axis="0 1 0" armature="1e-5"/>'
@@ -46,14 +49,21 @@ def mjcf(case: Case) -> str:
     ends = "</body>"
     body = "".join(links) + ends * n if case.chain else "".join(link + ends for link in links)
 
-    def pulley(i: int, j: int) -> str:
-        wraps = "".join(f'<joint joint="joint_{k}" coef="{case.arms[i, k]}"/>' for k in range(j, n) if case.arms[i, k])
-        return f'<fixed name="pulley_{i}_{j}">{wraps}</fixed>'
+    def tendon(name: str, i: int, joints: Sequence[int]) -> str:
+        wraps = "".join(f'<joint joint="joint_{j}" coef="{case.arms[i, j]}"/>' for j in joints if case.arms[i, j])
+        return f'<fixed name="{name}">{wraps}</fixed>'
 
-    pulleys = "".join(pulley(*pair) for pair in passes(case))
+    pulleys = "".join(tendon(f"pulley_{i}_{j}", i, range(j, n)) for i, j in passes(case))
+    cords = "".join(tendon(f"cord_{i}", i, range(n)) for i in range(len(case.arms)))
+    springs = "".join(
+        f'<position name="spring_{i}" tendon="cord_{i}" kp="{k}" forcelimited="true" forcerange="0 1e6"/>'
+        for i, k in enumerate(case.stiffness)
+    )
+    forces = "".join(f'<actuatorfrc actuator="spring_{i}"/>' for i in range(len(case.arms)))
     return f"""
 <mujoco><compiler angle="radian"/><option timestep="{STEP}" gravity="0 0 -9.81"/>
-  <worldbody>{body}</worldbody><tendon>{pulleys}</tendon>
+  <worldbody>{body}</worldbody><tendon>{pulleys}{cords if driven else ""}</tendon>
+  <actuator>{springs if driven else ""}</actuator><sensor>{forces if driven else ""}</sensor>
 </mujoco>"""
 
 
@@ -193,3 +203,47 @@ def inverse_torque(model: Any, given: Signals, owner: Any = None) -> Numbers:
         made[k] = data.qfrc_inverse
     model.tendon_frictionloss[:] = share
     return made
+
+
+# --- by rollouts ------------------------------------------------------------------------------------------------------
+
+
+def rolled(case: Case) -> Error:
+    """Numbers by motion: windows are simulated from measured states, as motors pull; judged as the others.
+
+    What is simulated is compared in angles and in the torque of the tendons' forces.
+    """
+    signals, spec = learned_signals(case), mujoco.MjSpec.from_string(mjcf(case, driven=True))
+    (m, n), step = case.arms.shape, float(np.median(np.diff(signals.time)))
+    whole = np.flatnonzero(np.isclose(signals.time[SPAN:] - signals.time[:-SPAN], SPAN * step))
+    first = whole[np.linspace(0, len(whole) - 1, WINDOWS).astype(int)]
+    rows = first[:, None] + np.arange(SPAN + 1)
+    state = np.column_stack([np.zeros(WINDOWS), signals.angle[first], signals.velocity[first]])
+    at = np.arange(0.0, SPAN * step - 0.5 * STEP, STEP) / step
+    drive = np.stack([_between(at, signals.motor[each]) for each in rows])
+    motion = np.stack([np.hstack([signals.angle[each], signals.torque[each]])[1:] for each in rows])
+    scale = motion.std(axis=(0, 1))
+    ends = np.round(np.arange(1, SPAN + 1) * step / STEP).astype(int) - 1
+
+    def residual(x: Numbers, parameters: Any) -> tuple[list[Numbers], None, None]:
+        columns = []
+        for column in np.atleast_2d(x.T):
+            parameters.update_from_vector(column)
+            model = sysid.apply_param_modifiers(parameters, spec)
+            zero = case.arms.std() * np.array([parameters[f"zero_{i}"].value[0] for i in range(m)])
+            states, forces = rollout.rollout(model, mujoco.MjData(model), state, drive + zero)
+            made = np.concatenate([states[:, ends, 1 : 1 + n], forces[:, ends] @ case.arms], axis=2)
+            columns.append(((made - motion) / scale).ravel())
+        return [columns[0] if x.ndim == 1 else np.column_stack(columns)], None, None
+
+    start = unknowns(case, np.abs(signals.force).mean(axis=0), False)
+    for i in range(m):  # of a motor: no number of MJCF
+        start.add(sysid.Parameter(f"zero_{i}", 0.0, -1.0, 1.0, modifier=lambda spec, own: None))
+    model = sysid.apply_param_modifiers(solved(start, residual), spec)
+    model.actuator_gainprm[:] = model.actuator_biasprm[:] = 0.0
+    return error_by(case, lambda given: inverse_torque(model, given))
+
+
+def _between(at: Numbers, values: Numbers) -> Numbers:
+    """[K, n] values [S, n] at fractions of their rows [K]."""
+    return np.column_stack([np.interp(at, np.arange(len(values)), column) for column in values.T])

@@ -56,6 +56,7 @@ class Signals:
     velocity: Numbers  # [N, n] rad/s
     acceleration: Numbers  # [N, n] rad/s²
     force: Numbers  # [N, m] N
+    motor: Numbers  # [N, m] m
     torque: Numbers  # [N, n] N·m, of the measured forces, less the known load: what a tool predicts
     history: Numbers  # [N, 2·n·lags] angles and velocities at LAGS before
 
@@ -71,11 +72,11 @@ def signals_of(case: Case, recording: tf.Recording, rate: float = RATE) -> Signa
     """Filtered, with derivatives, at a rate; an angle that was not measured follows from motors and springs."""
     groups, step = recording.groups, float(np.median(np.diff(recording.time)))
     force = groups["tendon_force"]
+    motor = groups.get("tendon_position", np.zeros_like(force))
     angle = groups.get("joint_position")
     if angle is None:
-        cords = groups["tendon_position"] - force / case.stiffness
-        angle = np.linalg.lstsq(case.arms, cords.T, rcond=None)[0].T
-    angle, force = (filtered(values, step) for values in (angle, force))
+        angle = np.linalg.lstsq(case.arms, (motor - force / case.stiffness).T, rcond=None)[0].T
+    angle, force, motor = (filtered(values, step) for values in (angle, force, motor))
     measured = groups.get("joint_velocity")
     velocity = np.gradient(angle, step, axis=0) if measured is None else filtered(measured, step)
     torque = force @ case.arms - filtered(known_load(recording, angle), step)
@@ -83,7 +84,7 @@ def signals_of(case: Case, recording: tf.Recording, rate: float = RATE) -> Signa
     history = np.hstack([delayed(values, rows) for values in (angle, velocity) for rows in late])
     acceleration = np.gradient(velocity, step, axis=0)
     kept = rows_at(recording, rate)
-    columns = (recording.time, angle, velocity, acceleration, force, torque, history)
+    columns = (recording.time, angle, velocity, acceleration, force, motor, torque, history)
     return Signals(*(column[kept] for column in columns))
 
 
