@@ -107,7 +107,8 @@ def external_names(text: str) -> set[str]:
     set of str
         Names, those that the file declares only included.
     """
-    code = re.sub(r"\bextern\s+\{", "", _NOT_CODE.sub(" ", text))  # extern "C"; its end counts for nothing
+    # of extern "C" the end counts for nothing; an alignment in parentheses is no function
+    code = re.sub(r"\bextern\s+\{|\b_Alignas\s*\([^)]*\)", "", _NOT_CODE.sub(" ", text))
     names = set()
     for statement in _outer_statements(code):
         declared = statement.partition("=")[0].strip()

@@ -47,6 +47,7 @@ needs_compiler = pytest.mark.skipif(
             {"pointer", "next"},
         ),
         ("const row table[] = {\n  {1, f(2)},\n};\nint after;", {"table", "after"}),
+        ("_Alignas(32) const double aligned[4] = {f(1)};", {"aligned"}),
         ("static int own(void) { return 0; }\nHOT_INLINE int hot(void) { return 0; }", set()),
         ('#define MACRO(x) \\\n  int x(void);\nconst char* text = "int in_text(void);";', {"text"}),
     ],

@@ -107,6 +107,17 @@ def guid(resource: bytes, table: VariableTable, *, at_end: bool = False) -> str:
     return native.image_guid(resource, (variable_generator().salt(table.data) + at_end) % 2**64)
 
 
+@dataclass(frozen=True)
+class Related:
+    """A file that an FMU carries by fmi-ls-ref."""
+
+    name: str  # name in the standard's folder
+    content: bytes  # the file
+    role: str  # role of fmi-ls-ref, and MIME type
+    kind: str
+    description: str  # one sentence
+
+
 def members(
     description: Finger,
     *,

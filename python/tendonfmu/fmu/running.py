@@ -28,7 +28,7 @@ from tendonfmu import model as models
 from tendonfmu.errors import InputError
 from tendonfmu.files import FORMATS, counted, path_of
 from tendonfmu.fmu.fmpy_client import Progress, run_fmu
-from tendonfmu.fmu.packaging import model_identifier
+from tendonfmu.fmu.packaging import Related, model_identifier
 from tendonfmu.model import Finger, inputs_used
 from tendonfmu.recordings import Recording
 
@@ -146,17 +146,6 @@ _ROOT_ATTRIBUTES = {
 }
 
 Table = dict[str, NDArray[Any]]
-
-
-@dataclass(frozen=True)
-class Related:
-    """A file of the folder."""
-
-    name: str  # name in the folder
-    content: bytes  # the file
-    role: str  # role of fmi-ls-ref, and MIME type
-    kind: str
-    description: str  # one sentence
 
 
 @dataclass(frozen=True)

@@ -29,8 +29,7 @@ from lxml.builder import ElementMaker
 from tendonfmu.errors import InputError
 from tendonfmu.files import check_output, counted, write_bytes
 from tendonfmu.fmu.model_variables import NOT_IN_XML, read_table
-from tendonfmu.fmu.packaging import package_file
-from tendonfmu.fmu.running import Related
+from tendonfmu.fmu.packaging import Related, package_file
 from tendonfmu.model import Finger, native
 
 ANNOTATION, OF_THE_SET = "tendonfmu.uncertainty", "tendonfmu.fit"
