@@ -27,7 +27,7 @@ from fit_data import recorded
 from oracle_trace import Trace, with_values, without_contact
 from random_fingers import Description, Recording, random_recording
 from repetitions import repeated
-from tendonfmu.estimate import estimation
+from tendonfmu.estimate.structure import Estimator
 
 Array = NDArray[Any]
 
@@ -47,7 +47,7 @@ class Part:
 
 def both(description: Description, group: Array, parts: list[Part]) -> tuple[Any, list[oracle_fit.Likelihood]]:
     """The estimator with its recordings, and the twin's likelihoods."""
-    estimator = estimation.Estimator(image_of(description), group)
+    estimator = Estimator(image_of(description), group)
     twin = twin_of(description, group, estimator.unknowns)
     likelihoods = []
     for number, part in enumerate(parts):
@@ -178,7 +178,7 @@ def test_a_long_recording_on_any_number_of_threads(threads: int) -> None:
     part.use = np.ones(samples, dtype=bool)
     part.use[5000:5400] = False
     part.use[-700:-3] = False
-    estimator = estimation.Estimator(image_of(description), group)
+    estimator = Estimator(image_of(description), group)
     estimator.add_recording(part.recording, 3, part.external_torque, part.use)
     z = off_start(estimator.unknowns, 6)
     R = np.array([tendon["moment_arms"] for tendon in description["tendons"]])
@@ -203,7 +203,7 @@ def test_innovations_are_the_contracts_residuals(seed: int) -> None:
     """r and b_eff of docs/reference/semantics/bias.md#bias-tracker, with contact detection out of reach."""
     description, recording, source = random_fit_case(seed, 200)
     group = groups(description)
-    estimator = estimation.Estimator(image_of(description), group)
+    estimator = Estimator(image_of(description), group)
     estimator.add_recording(recording, source)
     twin = twin_of(description, group, estimator.unknowns)
     z = off_start(estimator.unknowns, seed)

@@ -26,7 +26,7 @@ from oracle_ekf import JosephFilter
 from oracle_trace import with_values
 from random_fingers import Description, Recording
 from repetitions import repeated
-from tendonfmu.estimate import estimation
+from tendonfmu.estimate.structure import Estimator, Learner
 
 Array = NDArray[Any]
 
@@ -39,8 +39,8 @@ class Pair:
     def __init__(self, description: Description, group: Array, prior_std: float = 1.0, drift: float = 0.0) -> None:
         self.description = description
         image = image_of(description)
-        unknowns = estimation.Estimator(image, group).unknowns
-        self.learner = estimation.Learner(image, group, prior_std=prior_std, block=1, parameter_drift=drift)
+        unknowns = Estimator(image, group).unknowns
+        self.learner = Learner(image, group, prior_std=prior_std, block=1, parameter_drift=drift)
         self.twin = twin_of(description, group, unknowns)
         lower, upper, self.scale = (
             np.array([getattr(u, name) for u in unknowns]) for name in ("lower", "upper", "scale")
@@ -124,7 +124,7 @@ def test_bounds_hold() -> None:
 
 
 def learner_over(description: Description, group: Array, recording: Recording, passes: int = 1, **how: Any) -> Any:
-    learner = estimation.Learner(image_of(description), group, **how)
+    learner = Learner(image_of(description), group, **how)
     for number in range(passes):
         if number > 0:
             learner.begin_pass()
@@ -156,7 +156,7 @@ def test_covariance_stays_symmetric_and_positive_definite() -> None:
     np.testing.assert_array_equal(covariance, covariance.T)
     std = np.sqrt(np.diag(covariance))
     assert np.linalg.eigvalsh(covariance / np.outer(std, std)).min() > 0.0
-    scale = np.array([unknown.scale for unknown in estimation.Estimator(image_of(description), group).unknowns])
+    scale = np.array([unknown.scale for unknown in Estimator(image_of(description), group).unknowns])
     assert (std > 1e-5 * scale).all() and (std <= scale * (1 + 1e-12)).all()
 
 
@@ -166,7 +166,7 @@ def test_agrees_with_the_batch() -> None:
     group = groups(description, few_unknowns)
     recording = recorded(description, 10, 60.0, 50.0)
     learner = learner_over(description, group, recording, passes=8, prior_std=0.3)
-    estimator = estimation.Estimator(image_of(description), group)
+    estimator = Estimator(image_of(description), group)
     estimator.add_recording(recording, 3, recording["external_torque"])
     result = estimator.fit(prior_std=0.3, tolerance=1e-4)
     std = np.sqrt(np.diag(result.covariance))
@@ -178,7 +178,7 @@ def drawn_from_the_prior(seed: int, prior_std: float) -> tuple[Description, Arra
     """A finger whose numbers the learner's prior could have drawn, and its unknowns."""
     description = small_finger()
     group = groups(description)
-    unknowns = estimation.Estimator(image_of(description), group).unknowns
+    unknowns = Estimator(image_of(description), group).unknowns
     start, scale = (np.array([getattr(unknown, name) for unknown in unknowns]) for name in ("start", "scale"))
     z = start + prior_std * scale * np.random.default_rng(seed).standard_normal(len(start))
     return with_values(description, twin_of(description, group, unknowns).moved(z)), z
@@ -200,7 +200,7 @@ def test_errors_are_of_the_size_that_the_covariance_says() -> None:
     fingers, prior_std, scores, count = 8, 0.05, [], 0
     for seed in range(fingers):
         truth, z = drawn_from_the_prior(seed, prior_std)
-        learner = estimation.Learner(image_of(small_finger()), groups(small_finger()), prior_std=prior_std)
+        learner = Learner(image_of(small_finger()), groups(small_finger()), prior_std=prior_std)
         for part in range(10):
             recording = without_slack(truth, 100 * seed + part, 62.5)
             learner.run(recording, 3, recording["external_torque"])

@@ -13,13 +13,13 @@ from fit_cases import few_unknowns, groups, image_of, lasting_finger, small_fing
 from fit_data import make_recording, recorded, wavy_forces, wavy_motion
 from oracle_trace import with_values
 from random_fingers import Description, Recording
-from tendonfmu.estimate import estimation
+from tendonfmu.estimate.structure import Estimator
 
 Array = NDArray[Any]
 
 
 def estimator_with(description: Description, *recordings: Recording, key: Any = few_unknowns) -> Any:
-    estimator = estimation.Estimator(image_of(description), groups(description, key))
+    estimator = Estimator(image_of(description), groups(description, key))
     for recording in recordings:
         estimator.add_recording(recording, 3, recording.get("external_torque"))
     return estimator
@@ -38,7 +38,7 @@ def perturbed(estimator: Any, seed: int, by: float = 0.4) -> Array:
 
 def guessed(description: Description, seed: int, by: float = 0.3, key: Any = few_unknowns) -> Description:
     """The description as somebody would guess it: every unknown off by up to that share."""
-    estimator = estimation.Estimator(image_of(description), groups(description, key))
+    estimator = Estimator(image_of(description), groups(description, key))
     twin = twin_of(description, groups(description, key), estimator.unknowns)
     return with_values(description, twin.moved(perturbed(estimator, seed, by)))
 

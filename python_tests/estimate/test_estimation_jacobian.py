@@ -15,7 +15,7 @@ from fit_cases import groups, image_of, off_start, random_fit_case, shared_key, 
 from oracle_trace import Trace, with_values
 from repetitions import repeated
 from tendonfmu.errors import InputError
-from tendonfmu.estimate import estimation
+from tendonfmu.estimate.structure import Estimator
 
 Array = NDArray[Any]
 
@@ -31,7 +31,7 @@ class Case:
     def __init__(self, seed: int) -> None:
         self.description, self.recording, self.source = random_fit_case(seed, SAMPLES)
         group = groups(self.description, shared_key(seed) if seed % 2 else lambda path: path)
-        self.estimator = estimation.Estimator(image_of(self.description), group)
+        self.estimator = Estimator(image_of(self.description), group)
         self.estimator.add_recording(self.recording, self.source)
         self.twin = twin_of(self.description, group, self.estimator.unknowns)
         self.z = off_start(self.estimator.unknowns, seed)
