@@ -17,7 +17,8 @@ from tendonfmu.diagnosis.names import reported_causes, size_of
 from tendonfmu.diagnosis.result import CausePlace, Diagnosis, ModelErrors
 from tendonfmu.files import report_text
 from tendonfmu.report.diagnosis_files import build_report
-from tendonfmu.report.diagnosis_text import left_of, left_sentence, lines, tables, unit_of
+from tendonfmu.report.diagnosis_page import diagnosis_page
+from tendonfmu.report.diagnosis_text import headline, left_of, left_sentence, lines, tables, unit_of
 from tendonfmu.report.diagnosis_types import EFFECTS
 from tendonfmu.report.kit import percent, percent_interval, probability
 from tendonfmu.statistics.intervals import Interval
@@ -179,6 +180,16 @@ def test_a_correlated_remainder_is_not_called_noise(white: tuple[float, float], 
     left = left_of(found)
     assert left is not None and left.memory.startswith(memory) and bool(left.memory) == bool(memory)
     assert ("noise" in left_sentence(found)) == (memory == "") and memory in left_sentence(found)
+
+
+@pytest.mark.parametrize(("gain", "correlated", "is_told"), [(0.4, 0.9, True), (0.4, 0.1, False), (0.6, 0.9, False)])
+def test_an_explained_error_says_where_most_of_it_remains(gain: float, correlated: float, is_told: bool) -> None:
+    one = examples.one_cause()
+    views = tuple(view for k in (1, 2) for view in examples.views_of(k, 1e-3, {}, correlated))
+    found = replace(one, verdict="explained", gain=Interval(gain, gain, gain), views=views)
+    told = " mN·m remain, correlated over 95 ms: no recorded signal predicts them."
+    assert (told in headline(found)) == is_told
+    assert f'class="verdict {"" if is_told else "good"}"' in diagnosis_page(found)
 
 
 def test_numbers_are_told_as_people_write_them() -> None:

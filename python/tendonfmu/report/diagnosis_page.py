@@ -82,8 +82,9 @@ def diagnosis_page(diagnosis: Diagnosis) -> str:
 
 
 def _first_screen(diagnosis: Diagnosis, names: Names) -> dict[str, Any]:
+    is_open = any(map(texts.has_rivals, diagnosis.causes)) or texts.mostly_left(diagnosis)
     return {
-        "tone": "" if any(map(texts.has_rivals, diagnosis.causes)) else _TONES[diagnosis.verdict],
+        "tone": "" if is_open else _TONES[diagnosis.verdict],
         "headline": texts.headline(diagnosis),
         "error": texts.error_sentence(diagnosis),
         "left": texts.left_sentence(diagnosis),

@@ -123,9 +123,14 @@ def headline(diagnosis: Diagnosis) -> str:
     if any(map(has_rivals, diagnosis.causes)):
         text += f" {'It' if count == 1 else 'Some of them'} may also be another effect, which looks alike here."
     left = left_of(diagnosis)
-    if left is not None and not count and diagnosis.kind != "change" and diagnosis.verdict in ("adequate", "explained"):
+    if left is not None and diagnosis.kind != "change" and diagnosis.verdict in ("adequate", "explained"):
         memory = f", correlated over {left.memory}" if left.memory else ""
-        text = f"{text[:-1]}: {left.text(left.whole)} {unit_of(diagnosis)[1]} remain{memory}."
+        if not count:
+            text = f"{text[:-1]}: {left.text(left.whole)} {unit_of(diagnosis)[1]} remain{memory}."
+        elif mostly_left(diagnosis):
+            factor, unit = unit_of(diagnosis)
+            before = rounded(factor * together(diagnosis.nominal.test_rms))
+            text += f" But {left.text(left.whole)} of {before} {unit} remain{memory}: no recorded signal predicts them."
     for cause in reported_causes(diagnosis):
         if cause.where.effect == CONTACT and cause.changed is None:
             text += f" In some stretches {cause.title}: they were left out ({cause.size})."
@@ -133,6 +138,12 @@ def headline(diagnosis: Diagnosis) -> str:
             contact = f"{at_place(cause.title, cause.where, names_of(diagnosis))}, {cause.size}."
             text = f"{text} And {contact}" if count else capital(contact)
     return text
+
+
+def mostly_left(diagnosis: Diagnosis) -> bool:
+    """Return whether causes leave more than half of the error, and not as white noise."""
+    left = left_of(diagnosis)
+    return bool(diagnosis.causes and left is not None and left.memory) and diagnosis.gain.value < 0.5
 
 
 def error_sentence(diagnosis: Diagnosis) -> str:
