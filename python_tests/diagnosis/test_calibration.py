@@ -40,7 +40,7 @@ def look(share: Numbers, alike: bool = False) -> tuple[View, Selection]:
     target = values @ (share * USUAL) + coloured(rng)
     columns, grams = candidate_columns(values, MADE), grams_of(target, waves(rng, 3), values)
     view = cast("View", SimpleNamespace(data=FINGER, columns=columns, grams=grams, least=UNSEEN))
-    return view, Selection(grams, hypotheses(columns, np.full((4, 2), 1e3), np.ones(2)), UNSEEN)
+    return view, Selection(grams, hypotheses(columns, np.full((4, 2), 1e3), np.ones(2), np.full(2, np.inf)), UNSEEN)
 
 
 def judged(share: Numbers, alike: bool = False) -> tuple[Judged | None, Judged | None]:

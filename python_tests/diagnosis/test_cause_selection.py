@@ -59,7 +59,7 @@ def noise(seed: int) -> Numbers:
 
 def hypotheses_of(columns: CandidateColumns) -> list[Candidate]:
     """With arms so long that no correction of the torque is too large."""
-    return hypotheses(columns, np.full((4, JOINTS), 1e3), np.ones(JOINTS))
+    return hypotheses(columns, np.full((4, JOINTS), 1e3), np.ones(JOINTS), np.full(JOINTS, np.inf))
 
 
 def selection_of(
@@ -120,16 +120,18 @@ def test_corrections_of_the_torque_have_a_largest_size(columns: Numbers) -> None
         Made("moment_arm", 1, 2),
         Made("load_friction", 1, 2),
         Made("moment_arm_variation", 2, 2),
+        Made("gravity", 2, None),
     ]
     arms = np.array([[0.01, 0.01], [0.004, -0.008]])
-    reach = np.array([1.0, 0.5])
-    found = {each.effect: each for each in hypotheses(candidate_columns(columns[:, :, :4], made), arms, reach)}
+    reach, torque = np.array([1.0, 0.5]), np.array([np.inf, 0.1])
+    found = {each.effect: each for each in hypotheses(candidate_columns(columns[:, :, :5], made), arms, reach, torque)}
     assert (found["force_gain"].low, found["force_gain"].high) == (
         -LARGEST_SCALING,
         LARGEST_SCALING,
     )
     assert found["moment_arm"].high == pytest.approx([LARGEST_SCALING * 0.008])
     assert found["moment_arm_variation"].high == pytest.approx([LARGEST_SCALING * 0.008 / 0.5])
+    assert found["gravity"].high == pytest.approx([0.1 / np.sin(0.5)]), "no more than the torque that was measured"
     assert found["load_friction"].high == [LARGEST]
 
 

@@ -28,7 +28,7 @@ from tendonfmu.diagnosis.extension_fit import (
     memory_terms,
 )
 from tendonfmu.diagnosis.samples import Samples
-from tendonfmu.diagnosis.selection import Judged, LeastSizes, least_sizes
+from tendonfmu.diagnosis.selection import LeastSizes, least_sizes
 from tendonfmu.diagnosis.view import View, look
 from tendonfmu.estimate import choose_memory, held_delay, without_memory
 from tendonfmu.model import Finger
@@ -131,8 +131,7 @@ def _found_base(
     if is_new and positions.delay is not None and abs(positions.delay) >= least.least(Where(DELAY.name)):
         late = late_forces(positions.delay, fixed=True)
     start = [*known, late] if late else list(known)
-    described = extended_description(nominal.data, [term for terms in start for term in terms])
-    start = [*_position_dependent(described, samples, least, least_gain), *start]
+    start = [*_position_dependent(nominal, start, samples, settings, least, least_gain), *start]
     model, memory = _with_memory(given, nominal, start, samples, settings)
     remember = _with_memory
     if memory and memory_of(nominal.data):
@@ -162,13 +161,25 @@ def _with_shown_delay(given: Finger, positions: Positions) -> tuple[Finger, tupl
 # --- position-dependent torque ----------------------------------------------------------------------------------------
 
 
-def _position_dependent(data: Data, samples: Samples, least: LeastSizes, least_gain: float) -> list[tuple[Term, ...]]:
-    """Return the terms of effects that depend on angles alone, one effect after the other."""
-    view = look(data, samples, least, [by_name(name) for name in POSITION])
-    taken: list[Judged] = []
-    while best := view.beside({cause.where for cause in taken}).best(least_gain):
-        taken.append(best)
-    return [cause.scaled() for cause in taken]
+def _position_dependent(
+    nominal: FittedModel,
+    start: Sequence[tuple[Term, ...]],
+    samples: Samples,
+    settings: FitSettings,
+    least: LeastSizes,
+    least_gain: float,
+) -> list[tuple[Term, ...]]:
+    """Return the terms of effects that depend on angles alone, one effect after the other.
+
+    All numbers are fitted again after each: weight would otherwise correct how a cover that hardens was linearised.
+    """
+    data, held = _started(nominal, start)
+    found: list[tuple[Term, ...]] = []
+    while best := look(data, samples, least, [by_name(name) for name in POSITION]).selection.best(least_gain):
+        found.append(best.scaled())
+        described = extended_description(data, found[-1])
+        data = refitted(FittedModel(described, nominal.given, {}, fixed=held), samples, settings, rough=True).data
+    return found
 
 
 # --- memory -----------------------------------------------------------------------------------------------------------

@@ -141,10 +141,23 @@ class Candidate:
         return self.where.effect
 
 
-def hypotheses(columns: CandidateColumns, arms: Numbers, reach: Numbers) -> list[Candidate]:
-    """Return all effects that the description may lack, the coarse ones first."""
+def hypotheses(columns: CandidateColumns, arms: Numbers, reach: Numbers, torque: Numbers) -> list[Candidate]:
+    """Return all effects that the description may lack, the coarse ones first.
+
+    Parameters
+    ----------
+    columns
+        Columns of single places.
+    arms, reach, torque
+        Moment arms (m) [m, n]; largest angle (rad) and torque (N·m) of each joint in the recordings [n].
+
+    Returns
+    -------
+    list of Candidate
+        Each with the bounds that arms and recordings set.
+    """
     count = columns.values.shape[2]
-    listed = [_single(proposal, count, arms, reach) for proposal in columns.proposals]
+    listed = [_single(proposal, count, arms, reach, torque) for proposal in columns.proposals]
     for effect in SHARED:
         by_place: dict[Place, list[Proposal]] = {}
         for proposal in columns.proposals:
@@ -175,7 +188,7 @@ def _groups(effect: str, places: Sequence[Place]) -> Iterator[tuple[Where, int, 
 # --- effects that the description lacks -------------------------------------------------------------------------------
 
 
-def _single(proposal: Proposal, count: int, arms: Numbers, reach: Numbers) -> Candidate:
+def _single(proposal: Proposal, count: int, arms: Numbers, reach: Numbers, torque: Numbers) -> Candidate:
     variant, place, name = proposal.variant, proposal.place, proposal.mechanism.name
     mix = np.zeros((count, variant.count))
     mix[proposal.columns] = np.eye(variant.count)
@@ -185,6 +198,9 @@ def _single(proposal: Proposal, count: int, arms: Numbers, reach: Numbers) -> Ca
         largest = LARGEST_SCALING * (1.0 if name == "force_gain" else float(np.abs(arms[place.tendon - 1]).max()))
         if name == "moment_arm_variation" and place.joint is not None:
             largest /= max(float(reach[place.joint - 1]), 1e-9)
+        low, high = np.maximum(low, -largest), np.minimum(high, largest)
+    if name == "gravity" and place.joint is not None:  # a larger one only imitates other torque beside the cover's
+        largest = float(torque[place.joint - 1] / np.sin(np.clip(reach[place.joint - 1], 1e-9, np.pi / 2)))
         low, high = np.maximum(low, -largest), np.minimum(high, largest)
     if name == "friction_drift":
         high = np.minimum(high, LARGEST_DRIFT)
