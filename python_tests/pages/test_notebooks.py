@@ -56,9 +56,8 @@ def test_run_and_fit(tmp_path: Path) -> None:
     found = outputs_of(run_notebook(NOTEBOOKS[0], tmp_path))
     assert "<svg" in found["finger"][0]["data"]["text/html"]
     assert {trace["name"] for trace in figures_of(found["run"])[0]["data"]} == {"pulled", "friction", "compensated"}
-    assert any("not white" in each.get("text", "") for each in found["fit"])  # what the last cell refers to
     parameters = table_of(found["parameters"])
-    assert len(parameters) == 16 and sum(row[-1] == "True" for row in parameters.values()) >= 11
+    assert len(parameters) == 16 and 1 <= sum(row[-1] == "True" for row in parameters.values()) < 8  # "few"
     assert len(figures_of(found["plot"])) == 1
     for no_model, given, fitted in table_of(found["unseen"]).values():
         assert float(fitted) < 0.95 * float(given) < 0.15 * float(no_model)
@@ -74,7 +73,7 @@ def test_diagnose_and_extend(tmp_path: Path) -> None:
     # 2 %: ten standard errors of the fitted weight
     assert float(size[2]) == pytest.approx(1000 * float(hidden["magnitude"][0]), rel=0.02)
     gains = {name: [float(each) for each in row] for name, row in table_of(found["causes"]).items()}
-    assert list(gains) == ["gravity", "all"] and gains["gravity"][0] > gains["all"][0] > gains["all"][1] > 0.2
+    assert list(gains) == ["gravity", "unknown", "all"] and gains["all"][0] > gains["all"][1] > 0.2
     assert len(figures_of(found["plot"])) == 1
     for given, fitted, extended in table_of(found["extend"]).values():
         assert float(extended) < 0.8 * float(fitted) < 0.8 * float(given)
@@ -85,7 +84,9 @@ def test_diagnose_and_extend(tmp_path: Path) -> None:
 def test_detect_and_tune(tmp_path: Path) -> None:
     found = outputs_of(run_notebook(NOTEBOOKS[2], tmp_path))
     assert len(figures_of(found["plot"])[0]["layout"]["shapes"]) >= 4 * 2 * 11
-    assert any("for 6 an hour record 21.1 min more" in each.get("text", "") for each in found["tune"])
+    assert any(
+        re.search(r"6 false alarms an hour .* record [\d.]+ min more", each.get("text", "")) for each in found["tune"]
+    )
     rows = table_of(found["compare"])
     assert [row[0] for row in rows.values()] == ["8 of 11", "11 of 11", "11 of 11"]
     delays = [int(row[2].split()[0]) for row in rows.values()]
