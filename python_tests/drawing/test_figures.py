@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from pathlib import Path
 from typing import Any
@@ -9,8 +10,10 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 import pytest
+from PIL import Image
 
 from real_browser import Elements, figures_of, needs_nothing_else
+from repository_paths import ROOT
 from tendonfmu.drawing import (
     DIVERGING,
     GREEN,
@@ -22,6 +25,7 @@ from tendonfmu.drawing import (
     bars,
     curve,
     dots,
+    draw_finger,
     figures_json,
     heat,
     histogram,
@@ -32,6 +36,7 @@ from tendonfmu.drawing import (
     sheets_figure,
     stripes,
 )
+from tendonfmu.model import finger_drawing
 from tendonfmu.report import write_figures
 
 X = np.linspace(0.0, 10.0, 5)
@@ -168,3 +173,14 @@ def test_a_page_of_figures_needs_nothing_else_and_takes_any_name(tmp_path: Path)
     assert len(figures_of(page)) == 4
     assert "<script>alert" not in page and page.count('<div class="plot"') == 4
     assert [section["id"] for section in Elements(page).all("section")] == ["one", "other"]
+
+
+def test_the_icon_of_a_finger_marks_edges() -> None:
+    """Red is an edge; without friction there is none."""
+    finger = json.loads((ROOT / "examples" / "fingers" / "index_finger.json").read_text(encoding="utf-8"))
+    bare = {"joints": [{"name": "j"}], "tendons": [{"name": "a", "stiffness": 1e5, "moment_arms": [0.004]}]}
+    for description, edges in ((finger, True), (bare, False)):
+        icon = draw_finger(finger_drawing(description))
+        image = np.asarray(Image.open(io.BytesIO(icon)).convert("RGB"))
+        assert (image == (0xCC, 0x1F, 0x1A)).all(axis=-1).any() == edges and (image < 100).any()
+        assert image.shape == (480, 480, 3) and icon == draw_finger(finger_drawing(description))

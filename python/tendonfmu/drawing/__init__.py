@@ -1,6 +1,7 @@
-"""The figures of pages and notebooks. Draws ready-made data; computes nothing.
+"""The figures of pages and notebooks, and the picture of a finger. Draws ready-made data; computes nothing.
 
-`figures` has traces of Plotly, panels of them, sheets of panels; as JSON for a page, or as a figure for a notebook.
+- `figures`: traces of Plotly, panels of them, sheets of panels; as JSON for a page, or as a figure for a notebook
+- `finger_picture`: draws what an FMU carries, with Pillow
 """
 
 from typing import TYPE_CHECKING
@@ -40,5 +41,6 @@ if TYPE_CHECKING:
         sheets_figure,
         stripes,
     )
+    from .finger_picture import draw_finger, draw_terminal
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

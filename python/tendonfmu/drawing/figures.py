@@ -30,7 +30,7 @@ Key = tuple[str, str, float, str]  # CSS class, colour, opacity, meaning
 Size = Literal["small", "medium", "large", "wide"]
 
 BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION = "#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00"
-DARK, GREY, SILVER, SAND = "#222222", "#8A8A8A", "#BDBDBD", "#F0C27A"
+DARK, GREY, LIGHT, SKIN, SILVER, SAND = "#222222", "#8A8A8A", "#D5D8DC", "#F4F1EC", "#BDBDBD", "#F0C27A"
 COLOURS = (BLUE, VERMILION, GREEN, PURPLE, SKY, ORANGE, DARK, GREY)  # of curves that are alike
 DIVERGING = ("#2166AC", "#6BAED6", "#FFFFFF", "#F4895F", "#B2182B")  # from −1 over 0 to 1
 SIZES: Mapping[Size, tuple[int, int]]  # CSS pixels

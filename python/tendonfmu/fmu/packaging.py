@@ -163,6 +163,7 @@ def members(
 
 def illustrations(finger: Finger, template: str, model: Mapping[str, Any], **context: Any) -> dict[str, bytes]:
     """Return the HTML page of an FMU, its icon for importers of FMI 2, and its folder `terminalsAndIcons`."""
+    from tendonfmu.drawing import draw_finger
     from tendonfmu.model import finger_drawing, finger_svg, keys_of
 
     by_causality = {
@@ -177,13 +178,9 @@ def illustrations(finger: Finger, template: str, model: Mapping[str, Any], **con
         "finger": finger,
     }
     page = html_template(template).render(model=model, **by_causality, **routing, **context)
-    files = {"model.png": _picture("icon"), "documentation/index.html": page.encode()}
-    return files | terminals_and_icons(model["variables"])
-
-
-def _picture(name: str) -> bytes:
-    """Return a PNG of the package."""
-    return package_file(f"templates/{name}.png").read_bytes()
+    icon = draw_finger(drawing)
+    files = {"model.png": icon, "documentation/index.html": page.encode()}
+    return files | terminals_and_icons(model["variables"], icon)
 
 
 # --- parts -----------------------------------------------------------------------------------------------------------
@@ -349,17 +346,20 @@ def c_array_report(source: Path, finger: Finger, output: Path) -> dict[str, Any]
 # `sensors`.
 
 
-def terminals_and_icons(variables: Sequence[Mapping[str, Any]]) -> dict[str, bytes]:
+def terminals_and_icons(variables: Sequence[Mapping[str, Any]], icon: bytes) -> dict[str, bytes]:
     """Return the folder `terminalsAndIcons` of an FMU."""
     from lxml import etree
     from lxml.builder import ElementMaker
+
+    from tendonfmu.drawing import draw_terminal
 
     groups: dict[str, list[Mapping[str, Any]]] = {}
     for variable in variables:
         if variable.get("terminal"):
             groups.setdefault(variable["terminal"], []).append(variable)
     sides = {name: members[0]["causality"] for name, members in groups.items()}
-    files = {f"{name}.png": _picture(name) for name in ("icon", *sorted(set(sides.values())))}
+    files = {f"{side}.png": draw_terminal(is_input=side == "input") for side in sorted(set(sides.values()))}
+    files["icon.png"] = icon
     e = ElementMaker()
     root = e.fmiTerminalsAndIcons(
         _graphical_representation(e),

@@ -71,6 +71,9 @@ if TYPE_CHECKING:
     from .output_names import FLAGS, INPUTS, NUMBERS, OPTIONAL_NUMBERS, PLACE, SENSORS
     from .plausibility import Finding, description_findings, is_direct_drive
     from .routing_geometry import (
+        EDGE_RED,
+        TENDON_COLOURS,
+        FingerDrawing,
         Mark,
         finger_drawing,
         finger_svg,

@@ -1,8 +1,8 @@
 """Where each line and mark of a finger's routing drawing is, after the paper's fig. 3.
 
-Lengths are in units of the drawing. The finger lies along x, with its base on the left. A tendon passes above a joint
-if its moment arm is positive, and below if it is negative. Tendons that end early run inside, so that they do not cross
-those that continue.
+Lengths are in units of the drawing. `finger_svg` draws it for pages, `drawing/finger_picture.py` as an icon. The
+finger lies along x, with its base on the left. A tendon passes above a joint if its moment arm is positive, and below
+if it is negative. Tendons that end early run inside, so that they do not cross those that continue.
 """
 
 from __future__ import annotations
