@@ -1,4 +1,7 @@
 from .commands.build import build as build
+from .commands.calibrate import CalibrateResult as CalibrateResult
+from .commands.calibrate import CalibrationWarning as CalibrationWarning
+from .commands.calibrate import calibrate as calibrate
 from .commands.check import CheckResult as CheckResult
 from .commands.check import check as check
 from .commands.convert import convert as convert
@@ -10,10 +13,7 @@ from .commands.detection import tune as tune
 from .commands.diagnose import Diagnosis as Diagnosis
 from .commands.diagnose import DiagnosisWarning as DiagnosisWarning
 from .commands.diagnose import diagnose as diagnose
-from .commands.fit import CalibrateResult as CalibrateResult
-from .commands.fit import CalibrationWarning as CalibrationWarning
 from .commands.fit import FitResult as FitResult
-from .commands.fit import calibrate as calibrate
 from .commands.fit import fit as fit
 from .commands.hand.description import Hand as Hand
 from .commands.hand.description import read_hand as read_hand

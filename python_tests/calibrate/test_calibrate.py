@@ -14,16 +14,10 @@ import pytest
 from command import Call
 from pushed_finger import FINGER, FREE, UNSEEN, pushed
 from tendonfmu.calibration import calibration
-from tendonfmu.calibration.calibration import (
-    DIAGNOSED,
-    JUDGED,
-    Calibration,
-    calibrate,
-    fit_all,
-    stretches_for_diagnosis,
-)
+from tendonfmu.calibration.calibration import Calibration, calibrate
+from tendonfmu.calibration.fit import DIAGNOSED, JUDGED, fit_all, stretches_for_diagnosis
 from tendonfmu.calibration.text import verdict, write_calibration
-from tendonfmu.commands.fit import CalibrateResult
+from tendonfmu.commands.calibrate import CalibrateResult
 from tendonfmu.errors import InputError
 from tendonfmu.files.tables import write_table
 from tendonfmu.model.description import read_finger

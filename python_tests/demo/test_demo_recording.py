@@ -84,7 +84,7 @@ def test_a_third_of_the_friction_is_left_and_nothing_is_felt(
 
 
 def test_the_calibrated_finger_is_one_that_calibrate_takes_and_writes() -> None:
-    from tendonfmu.calibration.calibration import earlier_finger
+    from tendonfmu.calibration.fit import earlier_finger
 
     given, calibrated = (read_finger(path) for path in FINGERS.values())
     earlier = earlier_finger(given, FINGERS["calibrated"])

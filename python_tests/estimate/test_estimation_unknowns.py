@@ -19,7 +19,7 @@ from fit_cases import (
     twin_of,
 )
 from random_fingers import Description
-from tendonfmu.estimate import structure
+from tendonfmu.estimate import estimation
 from tendonfmu.estimate.verdicts import slopes
 
 SMALL = small_finger()
@@ -32,7 +32,7 @@ def estimator_of(description: Description, chosen: dict[str, int], scale: dict[s
     paths = parameters_of(description)[0]
     group = np.array([chosen.get(path, -1) for path in paths], dtype=np.int32)
     scales = None if scale is None else np.array([scale.get(path, np.nan) for path in paths])
-    return structure.Estimator(image_of(description), group, scales)
+    return estimation.Estimator(image_of(description), group, scales)
 
 
 def law_paths(prefix: str) -> list[str]:
@@ -44,7 +44,7 @@ def test_round_trip_on_random_fingers(seed: int) -> None:
     """z -> numbers as the twin has them, and back; the start is the description's."""
     description = random_fit_case(seed, 60)[0]
     group = groups(description, shared_key(seed) if seed % 2 else lambda path: path)
-    estimator = structure.Estimator(image_of(description), group)
+    estimator = estimation.Estimator(image_of(description), group)
     twin = twin_of(description, group, estimator.unknowns)
     # the mean of what is shared, but never above a static friction that is fixed
     bounds = [[getattr(unknown, name) for unknown in estimator.unknowns] for name in ("lower", "upper")]
@@ -118,7 +118,7 @@ def test_initial_torque_is_an_unknown_of_any_sign() -> None:
     ids=["stiffness", "noise", "threshold", "angle", "two kinds in one group"],
 )
 def test_what_cannot_be_estimated_is_refused(chosen: dict[str, int], named: str) -> None:
-    from tendonfmu.estimate.structure import EstimationError
+    from tendonfmu.estimate.estimation import EstimationError
 
     with pytest.raises(EstimationError) as refused:
         estimator_of(SMALL, chosen)
@@ -127,7 +127,7 @@ def test_what_cannot_be_estimated_is_refused(chosen: dict[str, int], named: str)
     short, long = np.full(len(PATHS) - 1, -1, dtype=np.int32), np.full(len(PATHS) + 1, np.nan)
     for group, scale in ((short, None), (groups(SMALL), long)):
         with pytest.raises(EstimationError, match=str(len(PATHS))):
-            structure.Estimator(image_of(SMALL), group, scale)
+            estimation.Estimator(image_of(SMALL), group, scale)
 
 
 def test_a_small_drop_moves_static_as_a_large_one_does() -> None:

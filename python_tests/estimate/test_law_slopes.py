@@ -11,8 +11,9 @@ from test_core_runs import REMEMBERING, finger
 
 from fit_finger import made_recording
 from tendonfmu.estimate.core_runs import CoreRuns, SlowDrift
+from tendonfmu.estimate.estimation import Estimator
 from tendonfmu.estimate.memory_fit import LawSlopes
-from tendonfmu.estimate.structure import Choice, Estimator, build_structure
+from tendonfmu.estimate.structure import Choice, build_structure
 from tendonfmu.model import finger_from_data
 from tendonfmu.recordings import Held, prepare
 

@@ -54,7 +54,7 @@ def test_each_compiled_module_has_one_user() -> None:
         if (each := re.match(r"tendonfmu\.(_native|_plant|_estimation)\b", f"{source}.{name}"))
     }
     assert users == {
-        ("_native", "model/native.py"), ("_plant", "simulate/plant.py"), ("_estimation", "estimate/structure.py"),
+        ("_native", "model/native.py"), ("_plant", "simulate/plant.py"), ("_estimation", "estimate/estimation.py"),
     }  # fmt: skip
 
 

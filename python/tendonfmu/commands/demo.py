@@ -24,10 +24,11 @@ from tendonfmu import calibration, estimate
 from tendonfmu import drawing as draw
 from tendonfmu import report as reporting
 from tendonfmu.commands.build import build
+from tendonfmu.commands.calibrate import CalibrateResult, calibrate
 from tendonfmu.commands.command import Progress, command, output_option
 from tendonfmu.commands.console import Bar, print_json, print_results, say, say_files, warn
 from tendonfmu.commands.detection import score
-from tendonfmu.commands.fit import CalibrateResult, calibrate, fit
+from tendonfmu.commands.fit import fit
 from tendonfmu.commands.run import run
 from tendonfmu.files import check_output_folder, write_bytes, write_text
 from tendonfmu.model import read_finger

@@ -79,7 +79,6 @@ COMMANDS = {
     "demo": ("Show every step on built-in data.", ""),
 }
 MODULES = {  # of commands that have none of their own name
-    "calibrate": "fit",
     "simulate": "build",
     **dict.fromkeys(("describe", "import", "export"), "descriptions"),
     **dict.fromkeys(("tune", "score"), "detection"),

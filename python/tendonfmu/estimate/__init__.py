@@ -1,6 +1,6 @@
 """Estimates the numbers of a finger from recordings (`tendonfmu fit`), and says how well each is known.
 
-`structure` chooses the numbers and binds the compiled estimator, `methods` runs it, and `fitting` combines both
+`structure` chooses the numbers, `methods` runs the compiled estimator (`estimation`), and `fitting` combines both
 behind an interface like that of scikit-learn. `verdicts` and `identifiability` judge the result.
 """
 
@@ -11,6 +11,7 @@ from tendonfmu.lazy_exports import lazy_exports
 if TYPE_CHECKING:
     from . import identifiability, verdicts
     from .core_runs import CoreRuns, SlowDrift, slowest_drift
+    from .estimation import ESTIMATION_MISSING, HAS_ESTIMATION, EstimationError, Estimator, Unknown
     from .files import (
         FIT_REPORT,
         check_given_once,
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
         read_previous_fit,
         with_previous_values,
     )
-    from .fisher_information import Noise, Progress, friction_probe, information, noise_of, sensitivities
+    from .fisher_information import Noise, Progress, information, noise_of, sensitivities
     from .fit_report import (
         Comparison,
         FitPicture,
@@ -53,14 +54,9 @@ if TYPE_CHECKING:
     from .memory_methods import guess_prior
     from .methods import learn_batch
     from .structure import (
-        ESTIMATION_MISSING,
-        HAS_ESTIMATION,
         SCALING,
         Choice,
-        EstimationError,
-        Estimator,
         Structure,
-        Unknown,
         build_structure,
         held_delay,
         torque_scales,

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.estimate.core_runs import CoreRuns, SlowDrift
+from tendonfmu.estimate.estimation import Unknown
 from tendonfmu.estimate.learning import Learned
-from tendonfmu.estimate.structure import Unknown
 from tendonfmu.estimate.verdicts import CAUSES, Fitted
 from tendonfmu.files import counted
 from tendonfmu.json_types import Count, Index, Number, Schema, Size, Values

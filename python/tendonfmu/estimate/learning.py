@@ -8,9 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tendonfmu.arrays import Data, Flags, Numbers
+from tendonfmu.estimate.estimation import Estimator
 from tendonfmu.estimate.files import PreviousFit
 from tendonfmu.estimate.memory_fit import MemoryProblem, Minimum
-from tendonfmu.estimate.structure import Estimator, Structure, with_values
+from tendonfmu.estimate.structure import Structure, with_values
 from tendonfmu.model import Finger, number_of
 from tendonfmu.options import FitOptions, option
 from tendonfmu.recordings import FitRecording

@@ -17,6 +17,7 @@ import numpy as np
 
 from tendonfmu.arrays import Data, Numbers
 from tendonfmu.estimate.core_runs import CoreRuns, SlowDrift
+from tendonfmu.estimate.estimation import Estimator
 from tendonfmu.estimate.fit_report import MemoryEntry
 from tendonfmu.estimate.learning import Learned, Settings, Watch, unknown_names
 from tendonfmu.estimate.memory import (
@@ -32,7 +33,7 @@ from tendonfmu.estimate.memory import (
 from tendonfmu.estimate.memory_fit import MemoryProblem, Minimum, minimise
 from tendonfmu.estimate.memory_methods import STEP, coarse_problem, from_starts, full_problem, guess_prior, no_show
 from tendonfmu.estimate.methods import learn_batch
-from tendonfmu.estimate.structure import Choice, Estimator, Structure, build_structure, with_values
+from tendonfmu.estimate.structure import Choice, Structure, build_structure, with_values
 from tendonfmu.model import Finger, effects, moment_arms, number_of
 from tendonfmu.recordings import FitRecording, best_angles, make_grid, on_encoders
 

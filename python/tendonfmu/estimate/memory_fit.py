@@ -19,8 +19,9 @@ from scipy.linalg import cho_factor, cho_solve
 
 from tendonfmu.arrays import Flags, Numbers
 from tendonfmu.estimate.core_runs import CoreRuns, SlowDrift
+from tendonfmu.estimate.estimation import Estimator
 from tendonfmu.estimate.memory import memory_paths
-from tendonfmu.estimate.structure import FIXED, Estimator, Structure
+from tendonfmu.estimate.structure import FIXED, Structure
 
 # --- derivatives by the numbers of laws -------------------------------------------------------------------------------
 # The core takes the share of its limit that friction with a memory holds as constant, which is exact for what slips and

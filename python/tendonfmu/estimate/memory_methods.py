@@ -16,6 +16,7 @@ import numpy as np
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.estimate.core_runs import RATE, CoreRuns, SlowDrift, slowest_drift
+from tendonfmu.estimate.estimation import Estimator
 from tendonfmu.estimate.learning import (
     GUESS,
     FitProgress,
@@ -31,7 +32,7 @@ from tendonfmu.estimate.learning import (
 )
 from tendonfmu.estimate.memory import starts
 from tendonfmu.estimate.memory_fit import MemoryProblem, Minimum, State, minimise
-from tendonfmu.estimate.structure import Estimator, Structure
+from tendonfmu.estimate.structure import Structure
 from tendonfmu.recordings import FitRecording, Grid, Segment, make_grid
 from tendonfmu.statistics import sample_weights
 

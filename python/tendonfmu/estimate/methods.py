@@ -1,4 +1,4 @@
-"""The two methods of a fit, maximum likelihood and Kalman filter, over the compiled estimator.
+"""The two methods of a fit, maximum likelihood and Kalman filter, over the estimator of `estimation.py`.
 
 Both first fit with each sample counting as one. If the residuals are then not white, each sample counts for its share
 of an effective number of samples (`sample_weights`), by joint and stretch of a recording, and the fit is repeated
@@ -18,6 +18,7 @@ import numpy as np
 
 from tendonfmu.arrays import Numbers
 from tendonfmu.errors import InputError, NothingLeftError
+from tendonfmu.estimate.estimation import BatchResult, EstimationError, Estimator, Learner
 from tendonfmu.estimate.learning import (
     GUESS,
     FitProgress,
@@ -33,7 +34,7 @@ from tendonfmu.estimate.learning import (
 )
 from tendonfmu.estimate.memory import has_memory
 from tendonfmu.estimate.memory_methods import learn_with_memory, learned_with_memory_at, stroke_time
-from tendonfmu.estimate.structure import BatchResult, EstimationError, Estimator, Learner, Structure
+from tendonfmu.estimate.structure import Structure
 from tendonfmu.files import counted
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import sample_weights

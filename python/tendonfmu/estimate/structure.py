@@ -10,8 +10,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -288,30 +287,3 @@ def _with_equal_values(finger: Finger, numbers: Sequence[Number], owners: Sequen
         mean = float(np.mean([member.value for member in members]))
         values |= {path: mean for member in members for path in member.paths if len(members) > 1}
     return finger.replace(values) if values else finger
-
-
-# --- the binding ------------------------------------------------------------------------------------------------------
-# That of the estimation is `_estimation` (runtime/include/tendonfmu_estimation.hpp).
-# If Eigen was not found when the package was built, there is no estimation: `Estimator` and `Learner` then raise
-# `InputError(ESTIMATION_MISSING)`, and everything else works.
-
-# find_spec, not try/except: a module that exists but does not load must raise its error
-HAS_ESTIMATION = find_spec("tendonfmu._estimation") is not None
-ESTIMATION_MISSING = "this installation cannot estimate parameters (Eigen was not found when it was built)"
-
-if TYPE_CHECKING or HAS_ESTIMATION:
-    from tendonfmu._estimation import BatchResult as BatchResult
-    from tendonfmu._estimation import EstimationError as EstimationError
-    from tendonfmu._estimation import Estimator as Estimator
-    from tendonfmu._estimation import Learner as Learner
-    from tendonfmu._estimation import Unknown as Unknown
-else:
-    EstimationError = InputError
-
-    class Estimator:
-        """What this installation lacks."""
-
-        def __init__(self, *_: Any, **_others: Any) -> None:
-            raise InputError(ESTIMATION_MISSING)
-
-    BatchResult = Learner = Unknown = Estimator

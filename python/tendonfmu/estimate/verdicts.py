@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from tendonfmu.arrays import Numbers
+from tendonfmu.estimate.estimation import Estimator, Unknown
 from tendonfmu.estimate.files import with_estimates
 from tendonfmu.estimate.identifiability import CAUSES as CAUSES_OF_A_MOTION
 from tendonfmu.estimate.identifiability import LIMIT, PRIOR, EffectCoverage, Verdict, explain, unvisited
 from tendonfmu.estimate.learning import Learned
 from tendonfmu.estimate.methods import learned_at
-from tendonfmu.estimate.structure import Choice, Estimator, Structure, Unknown, build_structure, numbers_in
+from tendonfmu.estimate.structure import Choice, Structure, build_structure, numbers_in
 from tendonfmu.model import Finger, Number, friction_numbers, number_of
 from tendonfmu.recordings import FitRecording
 
