@@ -27,7 +27,7 @@ from fit_data import recorded
 from oracle_trace import Trace, with_values, without_contact
 from random_fingers import Description, Recording, random_recording
 from repetitions import repeated
-from tendonfmu.estimate.structure import Estimator
+from tendonfmu.estimate.estimation import Estimator
 
 Array = NDArray[Any]
 

@@ -26,7 +26,7 @@ from oracle_ekf import JosephFilter
 from oracle_trace import with_values
 from random_fingers import Description, Recording
 from repetitions import repeated
-from tendonfmu.estimate.structure import Estimator, Learner
+from tendonfmu.estimate.estimation import Estimator, Learner
 
 Array = NDArray[Any]
 

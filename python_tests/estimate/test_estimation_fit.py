@@ -13,7 +13,7 @@ from fit_cases import few_unknowns, groups, image_of, lasting_finger, small_fing
 from fit_data import make_recording, recorded, wavy_forces, wavy_motion
 from oracle_trace import with_values
 from random_fingers import Description, Recording
-from tendonfmu.estimate.structure import Estimator
+from tendonfmu.estimate.estimation import Estimator
 
 Array = NDArray[Any]
 

@@ -15,7 +15,7 @@ from fit_cases import groups, image_of, off_start, random_fit_case, shared_key, 
 from oracle_trace import Trace, with_values
 from repetitions import repeated
 from tendonfmu.errors import InputError
-from tendonfmu.estimate.structure import Estimator
+from tendonfmu.estimate.estimation import Estimator
 
 Array = NDArray[Any]
 

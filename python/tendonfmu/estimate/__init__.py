@@ -21,7 +21,7 @@ if TYPE_CHECKING:
         read_previous_fit,
         with_previous_values,
     )
-    from .fisher_information import Noise, Progress, information, noise_of, sensitivities
+    from .fisher_information import Noise, Progress, friction_probe, information, noise_of, sensitivities
     from .fit_report import (
         Comparison,
         FitPicture,
