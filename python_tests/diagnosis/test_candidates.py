@@ -127,6 +127,18 @@ def case() -> Case:
     return Case()
 
 
+def test_a_cover_may_harden_about_any_angle_near_rest(case: Case) -> None:
+    """stiffness·(b − c)³ is a mixture of both columns beside a linear part and a constant, as far as |c| <= 0.2."""
+    (_, variant) = case.proposals("cover_hardening")[0]
+    bend = np.linspace(-0.5, 0.5)
+    for centre in (-0.2, 0.05, 0.2):
+        shares = 0.3 * np.array([0.2 + centre, 0.2 - centre]) / 0.4
+        row = variant.at(shares.tolist())["extensions"][-1]
+        cubic = 0.3 * (bend - centre) ** 3 - 0.3 * (3.0 * centre**2 * bend - centre**3)
+        np.testing.assert_allclose(row["stiffness"] * bend**3 + row["quadratic"] * bend**2, cubic, atol=1e-12)
+    assert variant.signs == (1, 1)
+
+
 def by_difference(case: Case, base: Data, numbers: Mapping[str, float], step: float) -> Numbers:
     changed = own_copy(base)
     for path, share in numbers.items():

@@ -30,6 +30,13 @@ def test_a_reaction_that_a_fit_left_at_zero_is_zero() -> None:
     assert words.endswith("of which the next joint feels 0 times as much")
 
 
+def test_a_cover_hardens_about_an_angle_of_its_own() -> None:
+    words = by_name("cover_hardening").size
+    numbers = {"stiffness": [(0.2, "N.m/rad3")], "quadratic": [(0.03, "N.m/rad2")]}
+    assert words(numbers).replace("\xa0", " ") == "a cubic spring of 0.2 N·m/rad³ about −50 mrad from its rest angle"
+    assert words({"stiffness": numbers["stiffness"]}).replace("\xa0", " ") == "a cubic spring of 0.2 N·m/rad³"
+
+
 def test_each_further_name_needs_more() -> None:
     """What every finger has does not count: presliding, a delay."""
     effects = ("presliding", "gravity", "stribeck")

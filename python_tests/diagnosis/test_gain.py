@@ -145,7 +145,7 @@ def test_a_hidden_effect_is_fitted_and_its_gain_is_true() -> None:
     training, test = prepared(truth, 1), prepared(truth, 2)
     samples, settings = Samples.of(nominal(), [training]), FitSettings(threads=1)
     before = fit_numbers(nominal(), samples, settings)
-    causes = [accepted("cover_hardening", Place(1), [1.0]), accepted("inertia", Place(2), [0.0001])]
+    causes = [accepted("cover_hardening", Place(1), [0.5, 0.5]), accepted("inertia", Place(2), [0.0001])]
     found = fit_extended(before, causes, samples, settings)
     parameters = cause_parameters(before.data, causes, found)
     value, unit = parameters[0]["extensions[1].stiffness"]

@@ -218,7 +218,7 @@ def test_absent_friction_is_not_estimated(tmp_path: Path) -> None:
         "pulley_friction": 4,
         "edge_friction": 4 * 5,
         "cover": 1,
-        "extensions": 1,
+        "extensions": 2,
         "bias": 2,
     }
     assert counts.asymmetric_laws == 1 and counts.bidirectional_tendons == 1 and counts.working_points == 2

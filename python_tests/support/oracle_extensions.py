@@ -25,6 +25,7 @@ Array = NDArray[Any]
 PLACES = ("joint", "tendon", "level")
 HISTORY = 64  # samples that a delay looks back on
 OPTIONAL_NUMBERS = {
+    "cover_hardening": ("quadratic",),
     "gravity": ("sine", "cosine"),
     "inertia_variation": ("sine", "cosine"),
     "pulley_eccentricity": ("sine", "cosine"),
@@ -109,7 +110,8 @@ def torque_of(row: Row, numbers: Mapping[str, Any], at: Moment, R: Array, cosine
     j, i = row.joint, row.tendon
     T = np.zeros(n, dtype=np.result_type(float, *numbers.values()))
     if row.effect == "cover_hardening":
-        T[j] = numbers["stiffness"] * (at.q[j] - at.rest[j]) ** 3
+        bend = at.q[j] - at.rest[j]
+        T[j] = numbers["stiffness"] * bend**3 + numbers["quadratic"] * bend**2
     elif row.effect == "gravity":
         assert j is not None
         theta = sum(cosines[k, j] * at.q[k] for k in range(j + 1))

@@ -266,7 +266,8 @@ class Trace:
             assert row.joint is not None
             stiffness = theta[f"{path}.stiffness"]
             if row.effect == "cover_hardening":
-                torque[..., row.joint] += stiffness * bend(row.joint) ** 3
+                cube, square = (bend(row.joint) ** power for power in (3, 2))
+                torque[..., row.joint] += stiffness * cube + theta[f"{path}.quadratic"] * square
             else:
                 pull = stiffness * (bend(row.joint) - bend(row.joint + 1))
                 torque[..., row.joint] += pull

@@ -86,7 +86,9 @@ def delay(rng: np.random.Generator, n: int, m: int, j: int, i: int) -> Row:
 
 
 MAKE: dict[str, Make] = {
-    "cover_hardening": lambda rng, n, m, j, i: {"joint": j, "stiffness": either(rng, 0.1)},
+    "cover_hardening": lambda rng, n, m, j, i: (
+        {"joint": j, "stiffness": either(rng, 0.1)} | ({"quadratic": 0.05 * i - 0.12} if i % 2 else {})
+    ),
     "gravity": gravity,
     "inertia": lambda rng, n, m, j, i: {"joint": j, "inertia": either(rng, 1e-3)},
     "inertia_variation": lambda rng, n, m, j, i: (

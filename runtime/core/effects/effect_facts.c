@@ -4,8 +4,9 @@
 
 #include "effect_facts.h"
 
-const effect_parameter cover_hardening_numbers[1] = {
+const effect_parameter cover_hardening_numbers[2] = {
   {.name = "stiffness", .unit = "N.m/rad3", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1000000000.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 1, .scale = 0.05, .scale_everywhere = 0.0},
+  {.name = "quadratic", .unit = "N.m/rad2", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1000000000.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 0, .scale = 0.02, .scale_everywhere = 0.0},
 };
 
 const effect_parameter gravity_numbers[2] = {

@@ -5,7 +5,7 @@
 #include "effect.h"
 
 /* Name, number in the image, places and numbers of each effect: the first line of its effect_type. */
-#define COVER_HARDENING_FACTS .name = "cover_hardening", .id = 1, .joint = PLACE_REQUIRED, .tendon = PLACE_REFUSED, .rule = PLACES_AS_SAID, .level = 0, .most = 0, .one_of = 0, .parameter_count = 1, .parameters = cover_hardening_numbers
+#define COVER_HARDENING_FACTS .name = "cover_hardening", .id = 1, .joint = PLACE_REQUIRED, .tendon = PLACE_REFUSED, .rule = PLACES_AS_SAID, .level = 0, .most = 0, .one_of = 0, .parameter_count = 2, .parameters = cover_hardening_numbers
 #define GRAVITY_FACTS .name = "gravity", .id = 2, .joint = PLACE_REQUIRED, .tendon = PLACE_REFUSED, .rule = PLACES_AS_SAID, .level = 0, .most = 0, .one_of = 0, .parameter_count = 2, .parameters = gravity_numbers
 #define INERTIA_FACTS .name = "inertia", .id = 3, .joint = PLACE_REQUIRED, .tendon = PLACE_REFUSED, .rule = PLACES_AS_SAID, .level = 0, .most = 0, .one_of = 0, .parameter_count = 1, .parameters = inertia_numbers
 #define INERTIA_VARIATION_FACTS .name = "inertia_variation", .id = 12, .joint = PLACE_REQUIRED, .tendon = PLACE_REFUSED, .rule = PLACES_NOT_LAST_JOINT, .level = 0, .most = 0, .one_of = 0, .parameter_count = 2, .parameters = inertia_variation_numbers
@@ -25,7 +25,7 @@
 #define TIME_DELAY_FACTS .name = "time_delay", .id = 24, .joint = PLACE_REFUSED, .tendon = PLACE_REFUSED, .rule = PLACES_AS_SAID, .level = 0, .most = 1, .one_of = 0, .parameter_count = 1, .parameters = time_delay_numbers
 #define STRIBECK_FACTS .name = "stribeck", .id = 25, .joint = PLACE_OPTIONAL, .tendon = PLACE_OPTIONAL, .rule = PLACES_EXACTLY_ONE, .level = 0, .most = 0, .one_of = 0, .parameter_count = 2, .parameters = stribeck_numbers
 
-extern const effect_parameter cover_hardening_numbers[1];
+extern const effect_parameter cover_hardening_numbers[2];
 extern const effect_parameter gravity_numbers[2];
 extern const effect_parameter inertia_numbers[1];
 extern const effect_parameter inertia_variation_numbers[2];

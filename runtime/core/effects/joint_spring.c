@@ -2,20 +2,24 @@
 
 #include "effect_facts.h"
 
-/* T_j = stiffness·(q_j − rest)³: the cubic part of the plastic cover's spring, beside the linear T_jq of eq. (8). */
+/* T_j = (stiffness·b + quadratic)·b², b = q_j − rest: what the plastic cover's spring has beside the linear T_jq of
+ * eq. (8). About an angle c from rest it hardens with quadratic = −3·stiffness·c. */
+
+enum { STIFFNESS, QUADRATIC, REACTION = QUADRATIC };
 
 static void cover_torque(effect_place place, const double* parameters, const effect_sample* sample,
                          const double* memory, double* torque) {
   (void)memory;
   const double bend = sample->angle[place.joint] - sample->rest_angle[place.joint];
-  torque[place.joint] += parameters[0] * bend * bend * bend;
+  torque[place.joint] += (parameters[STIFFNESS] * bend + parameters[QUADRATIC]) * bend * bend;
 }
 
 static void cover_slope(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
                         const effect_direction* direction, double* slope) {
   (void)memory;
   const double bend = sample->angle[place.joint] - sample->rest_angle[place.joint];
-  slope[place.joint] += 3.0 * parameters[0] * bend * bend * direction->angle[place.joint];
+  const double slope_of_bend = (3.0 * parameters[STIFFNESS] * bend + 2.0 * parameters[QUADRATIC]) * bend;
+  slope[place.joint] += slope_of_bend * direction->angle[place.joint];
 }
 
 const effect_type effect_cover_hardening = {
@@ -28,8 +32,6 @@ const effect_type effect_cover_hardening = {
 /* A spring between a joint and the next one, at rest where both covers are: T_j = c, T_{j+1} = −reaction·c with
  * c = stiffness·((q_j − rest_j) − (q_{j+1} − rest_{j+1})). With reaction 0 something else takes what the next joint
  * does not: a strap that ends before it, a hose that its motion stiffens. */
-
-enum { STIFFNESS, REACTION };
 
 static double bend_of(effect_place place, const effect_sample* sample) {
   const size_t j = place.joint;

@@ -136,8 +136,8 @@ MECHANISMS: tuple[Mechanism, ...] = (
         "range.",
         coordinate="angle",
         possible_places=places.joints,
-        make=terms.row(stiffness=1),
-        size=words.of("a cubic spring of {}", "stiffness"),
+        make=terms.hardening,
+        size=words.hardening,
         shared=True,
     ),
     Mechanism(

@@ -38,6 +38,7 @@ Make = Callable[[str, Data, Place, Shape], Variant]
 _ORDINARY = {"edge_friction": 0.02, "pulley_friction": 0.02, "friction": 0.005, "load_friction": 1e-4}
 _SLOW_SHARE = 0.3  # of the Coulomb friction: viscous friction at 100 times the threshold of motion
 _SPRING = 0.02  # N·m/rad
+_OFF_REST = 0.2  # rad, from the described rest angle, which nobody measures: a cover hardens about its own
 _VISCOUS = 0.2  # of the Coulomb friction, at a speed of 100 times the threshold of motion
 _DROP = 0.25  # of the Coulomb friction
 _LEAST_AMPLITUDE = -0.95  # of a Stribeck row: friction does not change its sign
@@ -61,6 +62,15 @@ def row(least: float = -math.inf, **signs: int) -> Make:
         return Variant(data, shape, columns, rows=(_row(name, place, dict.fromkeys(signs, 0.0) | written),))
 
     return make
+
+
+def hardening(name: str, data: Data, place: Place, shape: Shape) -> Variant:
+    """Return a cubic spring about any angle within `_OFF_REST` of the described rest angle."""
+    # stiffness·(b ± c)³ without its linear part and constant: both columns at least 0 span all centres in between
+    variant = row(stiffness=1, quadratic=1)(name, data, place, shape)
+    (cube,), (square,) = (tuple(column.numbers) for column in variant.columns)
+    ends = tuple({cube: 1.0, square: 3.0 * end} for end in (-_OFF_REST, _OFF_REST))
+    return replace(variant, columns=tuple(replace(variant.columns[0], numbers=numbers) for numbers in ends))
 
 
 def secant(number: str, *, most: float = math.inf) -> Make:

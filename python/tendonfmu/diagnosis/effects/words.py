@@ -92,6 +92,14 @@ def per_force(whose: str) -> Words:
     return words
 
 
+def hardening(numbers: Sizes) -> str:
+    """Return the cubic spring, and how far from the described rest angle it hardens alike to both sides."""
+    (stiffness, unit), (quadratic, _) = _one(numbers, "stiffness"), numbers.get("quadratic", [(0.0, "")])[0]
+    centre = -quadratic / (3.0 * stiffness) if stiffness else 0.0
+    about = f" about {quantity(centre, 'rad', sign=True)} from its rest angle" if quadratic else ""
+    return f"a cubic spring of {quantity(stiffness, unit)}{about}"
+
+
 def drift(numbers: Sizes) -> str:
     (amplitude, _), constant = _one(numbers, "amplitude"), _one(numbers, "time_constant")
     change = "more" if amplitude > 0 else "less"
