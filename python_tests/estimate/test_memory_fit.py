@@ -14,6 +14,7 @@ import pytest
 from fit_cases import small_finger
 from fit_data import make_recording, wavy_forces, wavy_motion
 from fit_finger import moved_start
+from tendonfmu import diagnose
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.fitting import FrictionFit
 from tendonfmu.estimate.learning import posterior_factor
@@ -22,7 +23,9 @@ from tendonfmu.estimate.structure import Choice
 from tendonfmu.model import finger_from_data, get_number, moment_arms
 from tendonfmu.recordings import FitRecording, Held, Recording, best_angles, prepare
 
-pytestmark = pytest.mark.filterwarnings("ignore::tendonfmu.estimate.fitting.FitWarning")
+pytestmark = pytest.mark.filterwarnings(
+    "ignore::tendonfmu.estimate.fitting.FitWarning", "ignore::tendonfmu.commands.diagnose.DiagnosisWarning"
+)
 
 Rows = tuple[dict[str, Any], ...]
 RELATIVE = {"effect": "presliding", "displacement": 0.3}  # s: 0.15 mm at tendons, 3 mrad at joints
@@ -197,14 +200,25 @@ def test_the_angles_known_best(noise: float, stretch: float, source: str) -> Non
     assert found.recordings[0].kinematics == 2
 
 
-@pytest.mark.parametrize(("noise", "says"), [(1e-5, True), (3e-3, False)])
-def test_a_fit_says_what_quieter_encoders_would_leave(noise: float, says: bool) -> None:
+def noisy_positions(noise: float, duration: float) -> Recording:
     """Tendon positions of 15 µm of noise make friction that remembers noisy; the encoders' noise is in rad."""
-    made, rng = recording(RELATIVE), np.random.default_rng(3)
+    made, rng = recording(RELATIVE, duration=duration), np.random.default_rng(3)
     groups = {name: values for name, values in made.groups.items() if name != "joint_velocity"}
     groups["tendon_position"] = groups["tendon_position"] + 1.5e-5 * rng.standard_normal((len(made.time), 4))
     groups["joint_position"] = groups["joint_position"] + noise * rng.standard_normal((len(made.time), 2))
-    noisy = Recording(made.path, made.time, groups)
+    return Recording(made.path, made.time, groups)
+
+
+def promised(advice: list[str]) -> float:
+    """What joint encoders would leave, of both joints together (N·m)."""
+    return (
+        float(np.linalg.norm(np.array(re.findall(r"([\d.]+), ([\d.]+) mN·m would", advice[0])[0], dtype=float))) / 1e3
+    )
+
+
+@pytest.mark.parametrize(("noise", "says"), [(1e-5, True), (3e-3, False)])
+def test_a_fit_says_what_quieter_encoders_would_leave(noise: float, says: bool) -> None:
+    noisy = noisy_positions(noise, 40.0)
     given = finger({**RELATIVE, "displacement": 1.0}, start=True)
     fit = FrictionFit(given, share=["tendons"], kinematics=1).fit(noisy)
     advice = [sentence for sentence in fit.warnings_ if "--kinematics 2" in sentence]
@@ -214,8 +228,13 @@ def test_a_fit_says_what_quieter_encoders_would_leave(noise: float, says: bool) 
         assert not any("--kinematics 2" in sentence for sentence in by_encoders.warnings_)
         left = [np.linalg.norm(each.report_["memory"]["left_delivered"]) for each in (by_encoders, fit)]
         assert left[0] < left[1] / 1.5
-        promised = np.array(re.findall(r"([\d.]+), ([\d.]+) mN·m would", advice[0])[0], dtype=float)
-        assert np.linalg.norm(promised) < 1.3e3 * left[0]  # no fewer than --kinematics 2 does leave, and little more
+        assert promised(advice) < 1.3 * left[0]  # no fewer than --kinematics 2 does leave, and little more
+
+
+def test_a_diagnosis_says_what_quieter_encoders_would_leave() -> None:
+    found = diagnose(finger({**RELATIVE, "displacement": 1.0}, start=True), [noisy_positions(1e-5, 12.0)])
+    advice = [sentence for sentence in found.warnings if "--kinematics 2" in sentence]
+    assert promised(advice) < np.linalg.norm(found.report["extended"]["test_rms"]) / 1.5
 
 
 # --- covariance
