@@ -76,13 +76,13 @@ def test_nothing_is_named_where_nothing_is_off(number: int) -> None:
     assert found(loaded, finger, number).causes == ()
 
 
-@pytest.mark.parametrize("hardening", [0.002, 0.006])
-def test_a_spring_that_stiffens_has_the_described_zero(hardening: float) -> None:
-    """hardening: per N, h/k² of a spring whose force is k·e + h·e²."""
+@pytest.mark.parametrize(("hardening", "share"), [(0.002, 1.0), (0.006, 1.0), (0.06, 0.8), (0.06, 0.7)])
+def test_a_spring_that_stiffens_has_the_described_zero(hardening: float, share: float) -> None:
+    """hardening: per N, h/k² of a spring whose force is k·e + h·e²; k is a share of the described stiffness."""
     frames = [FINGER.recording(seed, SECONDS) for seed in (1, 2)]
     for frame in frames:
         force, stiffness = frame["tendon_force[2]"], FINGER.stiffness[1]
-        stretch = 2.0 * force / stiffness / (1.0 + np.sqrt(1.0 + 4.0 * hardening * force))
+        stretch = 2.0 * force / (share * stiffness) / (1.0 + np.sqrt(1.0 + 4.0 * hardening * force))
         frame["tendon_position[2]"] += stretch - force / stiffness
     given = read_input(FINGER.description, frames[:1], frames[1:], None, 1, 0.03, True)
     assert placed(find_kinematic_causes(given, 0.03, 0).causes) == [("tendon_nonlinearity", None, 2)]

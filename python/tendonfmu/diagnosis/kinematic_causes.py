@@ -241,18 +241,14 @@ def _listed(data: Data, learned: Sequence[TendonRouting]) -> Iterator[Off]:
 def _zero(routing: TendonRouting) -> tuple[Learned, float]:
     """Return the zero of a tendon, and the force (N) about which its spring is off.
 
-    A spring may be off from no force on; or about the force in the middle of the motion; or it stiffens from no force
-    on: then the chord k·e + h·e² and its slope agree near the middle of both. With the simplest answer the zero is
-    least off.
+    That may be any force up to the middle of the motion: 0 for a spring of another stiffness, the middle for one that
+    is described for its working point, and between them for one that stiffens. Where one of these explains the zero,
+    the zero is not off.
     """
     zero, spring, force = routing.zero, routing.stiffness, float(routing.span[0, -1])
-    now, described = spring.value, spring.described
-    if not spring.is_known:
-        return zero, 0.0
-    centres = [0.0, force, *([force * described / (described + now)] if now > described else [])]
-    off, centre = min(
-        ((zero.off + f * (1.0 / now - 1.0 / described), f) for f in centres), key=lambda each: abs(each[0])
-    )
+    softer = 1.0 / spring.value - 1.0 / spring.described if spring.is_known else 0.0
+    centre = min(max(-zero.off / softer, 0.0), force) if softer else 0.0
+    off = zero.off + centre * softer
     return replace(zero, value=zero.described + off, p_value=_p_value(off, zero.half)) if centre else zero, centre
 
 
