@@ -14,6 +14,8 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
+from scipy.linalg import null_space
+from scipy.optimize import nnls
 
 from tendonfmu.arrays import Data, Flags, Numbers
 from tendonfmu.errors import InputError
@@ -37,8 +39,6 @@ SLOW_EVERY, SLOW_RUN = 10, 3  # of 10 strokes 3 in a row are slow, so that there
 HOME_SPEED = 0.5  # share of the greatest speed
 _GOLDEN = (0.7548776662466927, 0.5698402909980532)  # Roberts' R2 sequence: even in the plane
 PATTERN_CHANGE = 1.5  # s; from one pattern of tensions to the next, while the joints move on
-_SWEEPS = 5000
-_CLOSE = 1e-6  # of the highest tension; the remaining error is removed by shrinking towards the even pattern
 _STREAM = 0x7E17  # of random numbers; joints have 0 to 15
 
 
@@ -307,8 +307,7 @@ class _Patterns:
                 f"{counted(arms.shape[1], 'joint')} hold no tension; expected more tendons than joints"
             )
         pulls = np.array([not tendon.get("bidirectional") for tendon in data["tendons"]])
-        self._project = np.eye(len(arms)) - arms @ np.linalg.pinv(arms)
-        self._high = np.full(len(arms), variation.highest)
+        self._arms, self._high = arms, np.full(len(arms), variation.highest)
         self._low = np.where(pulls, variation.lowest, -variation.highest)
         self._even = self._even_pattern(pretension_vector(data), pulls, variation)
 
@@ -326,17 +325,8 @@ class _Patterns:
 
     def nearest(self, tight: Flags) -> Numbers:
         """Return the balanced tensions [m] nearest to the highest where `tight` [m], and to the lowest elsewhere."""
-        # The result is shrunk towards the even pattern by the remaining error, so that the limits hold.
-        tension, correction = self._project @ np.where(tight, self._high, self._low), np.zeros(len(tight))
-        for _ in range(_SWEEPS):
-            within = np.clip(tension + correction, self._low, self._high)
-            correction += tension - within
-            tension = self._project @ within
-            if np.abs(tension - within).max() < _CLOSE * self._high[0]:
-                break
-        way = tension - self._even
-        room = np.where(way > 0, self._high - self._even, self._even - self._low)
-        return self._even + way * min(1.0, float(np.min(room / np.maximum(np.abs(way), 1e-12))))
+        found = _nearest_balanced(self._arms, np.where(tight, self._high, self._low), self._low, self._high)
+        return self._even if found is None else found
 
 
 # --- quintic pieces between knots -------------------------------------------------------------------------------------
@@ -374,31 +364,38 @@ def evaluate_quintic(knots: Numbers, time: Numbers) -> tuple[Numbers, Numbers, N
 
 
 LEAST_SHARE = 0.05  # of the mean; keeps every pulling tendon taut
-_BALANCE_SWEEPS = 20000
 _ITERATIONS = 8  # each reduces the error to the share of the force that friction takes, some percent
+_NONE = 1e-9  # of a residual of unit size: no forces are within the limits
 
 
 def pretension_vector(data: Data) -> Numbers:
     """Return the tendon forces [m] per newton of pretension."""
     arms = moment_arms(data)
     pulls = np.array([not tendon.get("bidirectional") for tendon in data["tendons"]])
-    project = np.eye(len(arms)) - arms @ np.linalg.pinv(arms)
-    shares = project @ np.ones(len(arms))
-    least = np.where(pulls, LEAST_SHARE, -np.inf)
-    correction = np.zeros(len(arms))
-    for _ in range(_BALANCE_SWEEPS):
-        if np.all(shares >= least * (1 - 1e-9)):
-            break
-        allowed = np.maximum(shares + correction, least)
-        correction += shares - allowed
-        shares = project @ allowed
-    else:
+    even = np.ones(len(arms))
+    shares = _nearest_balanced(arms, even, np.where(pulls, LEAST_SHARE, -np.inf), np.inf * even)
+    if shares is None:
         raise InputError(
             "tendons: no balanced pretension; expected moment arms with a solution of "
             "Rᵀ f = 0 in which every tendon pulls"
         )
     mean = float(np.mean(shares))
     return shares / mean if mean > 1e-9 else np.zeros(len(arms))
+
+
+def _nearest_balanced(arms: Numbers, aim: Numbers, low: Numbers, high: Numbers) -> Numbers | None:
+    """Return the forces with Rᵀ f = 0 within limits that are nearest to `aim` [m], None if there are none."""
+    # least distance programming by non-negative least squares (C. L. Lawson, R. J. Hanson, 1974, chapter 23)
+    free = null_space(arms.T)  # [m, d]
+    scale, start = float(np.abs(aim).max()), free.T @ aim
+    bounds = (np.concatenate([low, -high]) - np.concatenate([free, -free]) @ start) / scale
+    limits = np.column_stack([np.concatenate([free, -free]), bounds])[np.isfinite(bounds)]
+    if not len(limits):
+        return np.asarray(free @ start)
+    unit = np.eye(limits.shape[1])[-1]
+    weights, error = nnls(limits.T, unit)
+    left = limits.T @ weights - unit
+    return None if error < _NONE else np.asarray(free @ (start - scale * left[:-1] / left[-1]))
 
 
 def balanced_forces(described: Finger, motion: Mapping[str, Numbers], pretension: Numbers) -> Numbers:
