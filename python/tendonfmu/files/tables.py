@@ -40,7 +40,7 @@ CheckNames = Callable[[Path, list[str]], Sequence[str] | None]
 
 # float() accepts more (1_000, nan, infinity), but such text is no measurement.
 _NUMBER = re.compile(r"[ \t\r\n]*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?[ \t\r\n]*")
-LOGS = "pip install h5py mcap mcap-protobuf-support pint rosbags"  # the extra `logs`: nothing is published yet
+LOGS = "pip install h5py mcap mcap-protobuf-support rosbags"  # the extra `logs`: nothing is published yet
 _FLAGS = {"true": 1.0, "false": 0.0}
 
 

@@ -38,7 +38,7 @@ class Flag(Reading, total=False):
 
 
 class Measured(Reading):
-    unit: Text  # Unit of the readings after scaling; other names than these need the extra logs (pint).
+    unit: Text  # Unit of the readings after scaling; any other name that pint knows.
 
 
 class TimeOrRate(HowToRead, total=False):

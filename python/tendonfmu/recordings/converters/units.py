@@ -1,8 +1,8 @@
 """Which units a map of columns may name, each with its factor to SI: si = factor · value.
 
-The tables hold the common units with their exact factors. Any other name is looked up in pint, which is part of the
-extra `logs` and takes most of a second to import; the common units work without it. Angles are kept apart from plain
-numbers, and no unit is both a length and an angle. A metre of a sliding axis stands for a radian (see `one_joint`).
+The tables hold the common units with their exact factors. Any other name is looked up in pint, which takes most of a
+second to import. Angles are kept apart from plain numbers, and no unit is both a length and an angle. A metre of a
+sliding axis stands for a radian (see `one_joint`).
 
 Stamps of a log become points in time, ns since 1970: integers, which lose nothing.
 """
@@ -26,7 +26,6 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from tendonfmu.errors import InputError
-from tendonfmu.files import require_extra
 
 POUND_FORCE = 4.4482216152605  # N, by definition
 INCH = 0.0254  # m, by definition
@@ -153,7 +152,6 @@ def _registry() -> Any:
 
 def _factor_by_pint(name: str, reference: str) -> float | None:
     """Return the factor to `reference`, or None. Root units keep the radian, which has no dimension, apart from 1."""
-    require_extra("pint", f"unit {name!r}")
     registry = _registry()
     try:
         given = registry.Quantity(1.0, registry.parse_units(name)).to_root_units()
