@@ -10,6 +10,7 @@ import pytest
 
 from fit_cases import small_finger
 from tendonfmu.diagnosis import extension_diagnosis as whole
+from tendonfmu.diagnosis import search as search_module
 from tendonfmu.diagnosis.answer import not_taken
 from tendonfmu.diagnosis.effects import Place, Term, Where, by_name
 from tendonfmu.diagnosis.effects.words import presliding
@@ -65,6 +66,22 @@ def test_what_resembles_friction_removes_more_than_another_form_of_its_memory() 
         assert search.lowers("gravity", before, after)
     assert not search.lowers("gravity", before, 0.99 * before), "not material"
     assert not search.lowers("gravity", before, np.where(np.arange(20) == 3, 0.0, before + 0.02)), "not certain"
+
+
+def test_a_refused_cause_has_the_gain_of_its_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Columns promise 7 % where the fit keeps 1 %; a cause that was not fitted has the promised gain."""
+    monkeypatch.setattr(search_module, "calibration", lambda *_: None)
+    promised = Judged(Where("gravity", 1), gain=Interval(0.07, 0.03, 0.11), p_value=1e-9)
+    before = np.linspace(0.9, 1.1, 20)
+    selection = SimpleNamespace(base=before, best=lambda *_: promised)
+    search = object.__new__(ExtensionSearch)
+    search.view = cast("Any", SimpleNamespace(selection=selection, beside=lambda _: selection))
+    search.refused, search._answered, search._least_gain, search.of_memory = [], set(), 0.03, 0.0
+    for model, gain in ((cast("Any", object()), 0.01), (None, 0.07)):
+        trial = search_module.Trial(promised, model, 0.99**2 * before)
+        search._best_fitted = lambda *_, trial=trial: trial  # type: ignore[method-assign]
+        refused = search._try_next(set())
+        assert refused is not None and not refused[1] and refused[0].gain.value == pytest.approx(gain)
 
 
 def test_the_last_check_compares_with_all_that_the_memory_explains(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -259,7 +259,11 @@ class ExtensionSearch(CauseSearch):
             trial = beside_calibration(self._best_fitted(selection, best), together)
         else:
             return None
-        return trial.cause, trial.cause.p_value < SIGNIFICANCE and self._take(trial)
+        if trial.cause.p_value < SIGNIFICANCE and self._take(trial):
+            return trial.cause, True
+        # columns around a model without the cause promise more than the fit with it keeps
+        kept = trial.cause.gain if trial.model is None else with_error(*rms_gain(self.view.selection.base, trial.error))
+        return replace(trial.cause, gain=kept), False
 
     def _best_fitted(self, selection: Selection, best: Judged) -> Trial:
         """Fit the effect, its rivals and its places, and return the best trial."""
