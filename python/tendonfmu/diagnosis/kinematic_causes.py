@@ -184,7 +184,7 @@ def find_kinematic_causes(given: Input, least_gain: float, seed: int) -> Kinemat
         whole = [recording.recording for recording in given.training]
         learned = learn_routing(given.finger, whole, reference, coupled=True)
     none = KinematicCauses(bool(reference))
-    known = {off.where: off for off in _listed(data, learned)}
+    known = {off.where: off for off in _listed(data, learned, bool(reference))}
     if not learned or any(off.number.is_absurd for off in known.values() if off.where.effect != COUPLING):
         return none
     offsets, single = _offsets(data, known)
@@ -223,7 +223,7 @@ def _is_certain(off: Off, tested: int) -> bool:
     return off.number.differs and off.number.p_value * tested < SIGNIFICANCE
 
 
-def _listed(data: Data, learned: Sequence[TendonRouting]) -> Iterator[Off]:
+def _listed(data: Data, learned: Sequence[TendonRouting], is_change: bool) -> Iterator[Off]:
     """Yield every number that the recordings show."""
     arms = moment_arms(data)
     for each in learned:
@@ -232,24 +232,28 @@ def _listed(data: Data, learned: Sequence[TendonRouting]) -> Iterator[Off]:
             effect = ARM if arms[i, j] else COUPLING
             least = LEAST_SHARE[effect] * abs(arms[i, j] or largest)
             yield Off(Where(effect, j + 1, i + 1), arm, least)
-        zero, force = _zero(each)
+        zero, force = _zero(each, is_change)
         spring = each.stiffness
         yield Off(Where(SPRING, None, i + 1), spring, LEAST_SHARE[SPRING] * spring.described, force)
         yield Off(Where(ZERO, None, i + 1), zero, LEAST_ANGLE * largest)
 
 
-def _zero(routing: TendonRouting) -> tuple[Learned, float]:
+def _zero(routing: TendonRouting, is_change: bool) -> tuple[Learned, float]:
     """Return the zero of a tendon, and the force (N) about which its spring is off.
 
     That may be any force up to the middle of the motion: 0 for a spring of another stiffness, the middle for one that
     is described for its working point, and between them for one that stiffens. Where one of these explains the zero,
-    the zero is not off.
+    the zero is not off. Without a reference, a spring that is off by less than matters could explain a small one, too:
+    cords are soft at first, and creep.
     """
     zero, spring, force = routing.zero, routing.stiffness, float(routing.span[0, -1])
     softer = 1.0 / spring.value - 1.0 / spring.described if spring.is_known else 0.0
     centre = min(max(-zero.off / softer, 0.0), force) if softer else 0.0
     off = zero.off + centre * softer
-    return replace(zero, value=zero.described + off, p_value=_p_value(off, zero.half)) if centre else zero, centre
+    if centre:
+        zero = replace(zero, value=zero.described + off, p_value=_p_value(off, zero.half))
+    least = 0.0 if is_change else LEAST_SHARE[SPRING] * abs(force) / spring.described
+    return replace(zero, material=max(zero.material, least)), centre
 
 
 # --- zeros ------------------------------------------------------------------------------------------------------------
