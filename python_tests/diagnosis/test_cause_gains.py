@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -14,6 +15,7 @@ from tendonfmu.diagnosis import search as search_module
 from tendonfmu.diagnosis.answer import not_taken
 from tendonfmu.diagnosis.effects import Place, Term, Where, by_name
 from tendonfmu.diagnosis.effects.words import presliding
+from tendonfmu.diagnosis.extension_fit import MemoryTerm
 from tendonfmu.diagnosis.result import Cause
 from tendonfmu.diagnosis.search import FORM, ExtensionSearch
 from tendonfmu.diagnosis.selection import Judged, names_needed
@@ -96,6 +98,29 @@ def test_the_last_check_compares_with_all_that_the_memory_explains(monkeypatch: 
     assert bench.shares_of_memory(models["full"], without) == pytest.approx(np.sqrt([25.0 / 91.0, 1.0 / 91.0]))
     bench.of_memory = 0.0
     assert bench.shares_of_memory(models["full"], without) == [np.inf, np.inf], "no memory"
+
+
+def test_a_part_of_the_memory_that_is_not_certain_stays_in_presliding() -> None:
+    """Presliding alone is uncertain; with relaxation in it, it is certain. What gains nothing is weak as before."""
+    element, cord = {"effect": "presliding", "displacement": 0.1}, {"effect": "cord_stretch", "stiffness": 1e4}
+    relaxing = {**element, "relaxation_time": 0.5}
+    rows = {"presliding": (element,), "relaxation": (relaxing,), "cord_stretch": (cord,)}
+    given = [Judged(Where(name), (MemoryTerm(by_name(name), Place(), rows=own),)) for name, own in rows.items()]
+    bench = whole._Bench.__new__(whole._Bench)
+    bench._found = cast("Any", SimpleNamespace(base=SimpleNamespace(least=SimpleNamespace(shows_all=lambda *_: True))))
+    bench.fit = lambda causes: cast("Any", SimpleNamespace(data=None))  # type: ignore[method-assign]
+    bench.each_without = lambda causes: [bench.fit(causes)] * len(causes)  # type: ignore[method-assign]
+    bench.shares_of_memory = lambda fit, without: [1.0] * len(without)  # type: ignore[method-assign]
+    gains = {"presliding": Interval(0.4, 0.2, 0.6), "relaxation": Interval(0.08, -0.02, 0.2)}
+    for of_cords, names in ((0.08, ["presliding"]), (0.01, ["presliding", "cord_stretch"])):
+        gains["cord_stretch"] = Interval(of_cords, -0.1, 0.2)
+        bench.with_gain = lambda cause, *_: replace(cause, gain=gains[cause.effect])  # type: ignore[method-assign]
+        causes, weak = bench.judged(0.03, given)
+        assert [cause.effect for cause in causes] == names and [causes[k].effect for k in weak] == names[1:]
+        ((term,), *_) = (cause.terms for cause in causes)
+        assert term.added_to({})["extensions"] == [relaxing, cord][: 3 - len(names)]
+    assert whole.remembered(given[1:], given[1]) is None, "described presliding"
+    assert whole.remembered(given, Judged(Where("gravity", 1))) is None
 
 
 def test_only_laws_of_the_nominal_description_are_asked_about(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -74,6 +74,14 @@ class MemoryTerm(Term):
         return {**data, "extensions": [*others, *elements, *cords]}
 
 
+def with_part(presliding: Term, part: Term) -> MemoryTerm:
+    """Return the term of presliding with relaxation or cords of its own."""
+    assert isinstance(presliding, MemoryTerm) and isinstance(part, MemoryTerm)
+    of_cords = part.mechanism.name == CORDS
+    others = [row for row in presliding.rows if (row["effect"] == CORDS) != of_cords]
+    return replace(presliding, rows=(*others, *part.rows) if of_cords else (*part.rows, *others))
+
+
 def memory_terms(data: Data, rows: Sequence[Row]) -> list[tuple[Term, ...]]:
     """Return what a description lacks of the rows of a memory, each part as the terms of one cause."""
     given = memory_of(data)
