@@ -153,7 +153,8 @@ def test_a_cause_that_is_significant_is_too_small_or_uncertain() -> None:
             ("backlash", (-0.1, -0.2, 0.0)),
         )
     )
-    parts = not_taken([small, wide, none], {none.where: "move slowly"}, 40.0)
+    chance = replace(wide, where=Where("force_gain", None, 4), p_value=1.0)
+    parts = not_taken([small, wide, none, chance], {none.where: "move slowly"}, 40.0)
     assert [cause.effect for cause in parts["too_small"]] == ["inertia"]
     assert [cause.experiment for cause in parts["uncertain"]] == [
         "test on 90 s of such motion, in place of 40 s",  # 1.2 · (0.19/0.14)² · 40 s

@@ -307,13 +307,13 @@ def reported(found: Judged, compared: Compared, **numbers: Any) -> Cause:
 
 
 def not_taken(causes: Iterable[Cause], experiments: Mapping[Where, str], seconds: float) -> dict[str, Any]:
-    """Divide causes that are significant but were not taken into those that are too small and the uncertain ones."""
+    """Divide causes that were not taken into those that are too small and the uncertain ones, without mere chance."""
     # `experiments` names those planned; `seconds` of unseen motion were judged
     small, uncertain = list[Cause](), list[Cause]()
     for cause in causes:
-        if cause.gain.low > 0.0 or cause.p_value >= SIGNIFICANCE:
+        if cause.gain.low > 0.0:
             small.append(cause)
-        else:
+        elif cause.p_value < SIGNIFICANCE:
             settling = _longer(cause.gain, seconds) or experiments.get(cause.where) or OTHER_MOTION
             uncertain.append(replace(cause, experiment=settling))
     return {"too_small": tuple(small), "uncertain": tuple(uncertain)}
