@@ -117,9 +117,11 @@ def test_the_rival_leaves_as_much_as_promised(planned: Experiments) -> None:
 
 
 def all_entries() -> list[Entry]:
-    recorded = Recorded(np.array(RANGES), 1.0, 10.0, np.array([0.02, 0.02]), 30.0)
+    recorded = Recorded(np.array(RANGES), 1.0, 10.0, np.full(4, 25.0), np.array([0.02, 0.02]), 30.0)
     plain = list(motions(recorded))
-    varied = [each for first in plain[:2] for each in (*tensions(FINGER, first), *loads(FINGER, first, recorded))]
+    varied = [
+        each for first in plain[:2] for each in (*tensions(FINGER, first, recorded), *loads(FINGER, first, recorded))
+    ]
     return [*plain[:-1], *varied, *combined(FINGER, plain[3], recorded)]
 
 
@@ -151,15 +153,25 @@ def test_a_motion_stays_where_it_was_recorded(entry: Entry) -> None:
     assert bool(entry.load) == bool(found.load.any())
 
 
+@pytest.mark.parametrize(("largest", "highest"), [(100.0, 20.0), (15.0, None), (5.0, 10.0)])
+def test_no_tendon_is_pulled_more_than_it_was(largest: float, highest: float | None) -> None:
+    """Twice the recorded pretension of 10 N, or what its tightest tendon has borne; at least the recorded one."""
+    recorded = Recorded(np.array(RANGES), 1.0, 10.0, np.full(4, largest), np.array([0.02, 0.02]), 30.0)
+    first, varied = tensions(FINGER, next(motions(recorded)), recorded)
+    most = highest or largest / float(pretension_vector(FINGER).max())
+    assert [section.pretension for section in first.sections] == pytest.approx([most / 4, most / 2, most])
+    assert [section.vary and section.vary.highest for section in varied.sections] == [pytest.approx(most)]
+
+
 def test_a_menu_has_what_a_finger_can_do() -> None:
     """One joint with a cable loop holds no pretension: known loads only."""
     loop = {
         "joints": [{"friction": LAW}],
         "tendons": [{"stiffness": 1e5, "moment_arms": [0.005], "bidirectional": True}],
     }
-    recorded = Recorded(np.array([[-1.0, 1.0]]), 2.0, 3.0, np.array([0.02]), 30.0)
+    recorded = Recorded(np.array([[-1.0, 1.0]]), 2.0, 3.0, np.array([9.0]), np.array([0.02]), 30.0)
     entry = next(motions(recorded))
-    assert list(tensions(loop, entry)) == []
+    assert list(tensions(loop, entry, recorded)) == []
     (loaded,) = loads(loop, entry, recorded)
     assert [section.load for section in loaded.sections] == [pytest.approx((sign * 0.06,)) for sign in (1, -1, 1, -1)]
     assert combined(loop, entry, recorded) == []

@@ -243,8 +243,8 @@ def _zero(routing: TendonRouting, is_change: bool) -> tuple[Learned, float]:
 
     That may be any force up to the middle of the motion: 0 for a spring of another stiffness, the middle for one that
     is described for its working point, and between them for one that stiffens. Where one of these explains the zero,
-    the zero is not off. Without a reference, a spring that is off by less than matters could explain a small one, too:
-    cords are soft at first, and creep.
+    the zero is not off. Without a reference, a spring that is off by less than counts could explain a small one, too:
+    cords are soft at first.
     """
     zero, spring, force = routing.zero, routing.stiffness, float(routing.span[0, -1])
     softer = 1.0 / spring.value - 1.0 / spring.described if spring.is_known else 0.0
@@ -252,7 +252,7 @@ def _zero(routing: TendonRouting, is_change: bool) -> tuple[Learned, float]:
     off = zero.off + centre * softer
     if centre:
         zero = replace(zero, value=zero.described + off, p_value=_p_value(off, zero.half))
-    least = 0.0 if is_change else LEAST_SHARE[SPRING] * abs(force) / spring.described
+    least = 0.0 if is_change else spring.material * abs(force) / spring.described**2
     return replace(zero, material=max(zero.material, least)), centre
 
 

@@ -19,7 +19,8 @@ from tendonfmu.excite import Variation, pretension_vector
 from tendonfmu.files import listed
 from tendonfmu.model import moment_arms
 
-LEVELS = (0.5, 1.0, 2.0, 4.0)  # of the pretension that was recorded
+LEVELS = (0.25, 0.5, 1.0)  # of the highest pretension
+HIGHEST = 2.0  # times the recorded one, but no tendon is pulled more than it was
 SLOW, FAST = 0.2, 2.5  # of the speed that was recorded
 EVERY = 2.0  # s, between changes of the tensions
 WIDER = 1.6  # times the range that was recorded
@@ -107,6 +108,7 @@ class Recorded:
     ranges: Numbers  # rad [n, 2]
     speed: float  # fastest, rad/s
     pretension: float  # mean tendon force, N
+    force: Numbers  # largest of each tendon, N [m]
     torque: Numbers  # spread of the joint torque, N·m [n]
     seconds: float  # length of the longest stretch
     load: Numbers | None = None  # mean of the known load, N·m [n]
@@ -119,6 +121,7 @@ def recorded_of(span: Span, load: Numbers | None = None) -> Recorded:
         ranges=np.column_stack([middle - half, middle + half]),
         speed=max(float(span.speed.max()), _LEAST_SPEED),
         pretension=float(np.abs(span.force).mean()),
+        force=np.abs(span.force).max(axis=1),
         torque=span.torque,
         seconds=span.duration,
         load=load,
@@ -200,12 +203,13 @@ def _small_strokes(recorded: Recorded, usual: Section) -> Entry:
 # --- pretensions and loads --------------------------------------------------------------------------------------------
 
 
-def tensions(data: Data, entry: Entry) -> Iterator[Entry]:
+def tensions(data: Data, entry: Entry, recorded: Recorded) -> Iterator[Entry]:
     """Yield the entry at several pretensions, and with tensions that swing faster than a bias drifts."""
-    base = entry.sections[0].pretension
-    if not own_tension(data).any() or base <= 0:
+    base, own = entry.sections[0].pretension, np.abs(own_tension(data))
+    if not own.any() or base <= 0:
         return
-    levels = [level * base for level in LEVELS]
+    highest = min(HIGHEST * base, max(base, float(np.min(recorded.force[own > 0.0] / own[own > 0.0]))))
+    levels = [level * highest for level in LEVELS]
     yield replace(
         entry,
         sections=tuple(
@@ -213,7 +217,7 @@ def tensions(data: Data, entry: Entry) -> Iterator[Entry]:
         ),
         tension=f"at pretensions of {listed([f'{level:.3g}' for level in levels])} N",
     )
-    low, high = levels[0], levels[-2]
+    low, high = levels[0], levels[-1]
     yield replace(
         entry,
         sections=tuple(replace(section, vary=Variation(low, high, EVERY)) for section in entry.sections),
@@ -273,4 +277,4 @@ def _shortened(section: Section, count: int, **changes: Any) -> Section:
 
 def combined(data: Data, motion: Entry, recorded: Recorded) -> Sequence[Entry]:
     """Return a motion at several pretensions, each with a known load."""
-    return [loaded for tense in tensions(data, motion) for loaded in loads(data, tense, recorded)]
+    return [loaded for tense in tensions(data, motion, recorded) for loaded in loads(data, tense, recorded)]

@@ -120,7 +120,7 @@ def plan_experiments(
     lab = _Laboratory(data, recordings, questions, noise, span, seed)
     recorded = recorded_of(span, None if own_tension(data).any() else _mean_load(data, recordings))
     *plain, long = motions(recorded)
-    varied = [*tensions(data, plain[0]), *loads(data, plain[0], recorded)]
+    varied = [*tensions(data, plain[0], recorded), *loads(data, plain[0], recorded)]
     scores = []
     # effects that only change over time show in long recordings, which take long to predict
     slow = any(
