@@ -242,7 +242,7 @@ def push_sentence(report: Report) -> str:
         return f"The recordings have no labelled push; {many} in {pushes['free_minutes']:.1f} min."
     late = f", {pushes['found_at_release']} of them only as they end," if pushes["found_at_release"] else ""
     share = pushes["free_alarm_share"]["value"]
-    on = "" if share is None else f", of which {100 * share:.2g} % are in alarm, most of it after pushes"
+    on = "" if not share else f", of which {100 * share:.2g} % are in alarm, most of it after pushes"
     return (
         f"{pushes['found']} of {pushes['events']} labelled pushes are found{late} with {many} in "
         f"{pushes['free_minutes']:.1f} min without contact{on}."
