@@ -58,6 +58,7 @@ def made_up(
     still: bool = False,
     stiff: float = 1.0,
     rubbing: float = 0.0,
+    creep: tuple[float, float] = (0.0, 1.0),
 ) -> tuple[Finger, Recording]:
     """A minute at 100 Hz of a finger that shares no code with the rest, and its true description."""
     draws = np.random.default_rng(seed)
@@ -74,7 +75,14 @@ def made_up(
         angle[:, 1] = 0.3
     force = 12.0 + 6.0 * np.sin(draws.uniform(0.3, 1.5, 3) * time[:, None] + draws.uniform(0, 6, 3))
     force += 2.0 * np.sign(np.gradient(angle[:, :1], axis=0))  # friction that turns round
-    position = angle @ ARMS.T + force / (stiff * STIFFNESS) + ZEROS
+    share, seconds = creep
+    crept = force[:1]  # the part of the stretch that follows slowly
+    if share:
+        force += 3.0 * np.sign(np.sin(time / 3.0))[:, None]  # another pretension
+        kept, crept = np.exp(-0.01 / seconds), force.copy()
+        for k in range(1, len(time)):
+            crept[k] = kept * crept[k - 1] + (1.0 - kept) * force[k]
+    position = angle @ ARMS.T + (force + share * crept) / (stiff * STIFFNESS) + ZEROS
     position[:, 0] += curved * angle[:, 0] ** 2
     for j in range(2) if rubbing else ():  # behind each level a cord bears a share less, or more where it is let out
         position -= rubbing * force * turned_round(angle[:, j:] @ ARMS[:, j:].T, 3e-5) / STIFFNESS
@@ -117,6 +125,18 @@ def test_friction_along_a_cord_is_no_other_spring() -> None:
             off += [abs(number.value / number.described - 1.0) for number in (each.stiffness, *each.arms.values())]
             covered += [abs(number.value - number.described) <= number.half for number in each.numbers]
     assert max(off) < 0.008 and np.mean(covered) > 0.7  # without regard to it: 0.037
+
+
+@pytest.mark.parametrize("seconds", [0.8, 5.0])
+def test_a_cord_that_creeps_has_no_other_zero(seconds: float) -> None:
+    """The stiffness is that of a load at rest, whatever time the cord takes."""
+    stiffness, zeros = [], []
+    for seed in range(4):
+        finger, recording = made_up(seed, creep=(0.05, seconds))
+        for each in learn_routing(finger, [recording]):
+            stiffness.append(abs(1.05 * each.stiffness.value / each.stiffness.described - 1.0))
+            zeros.append(abs(each.zero.off))
+    assert max(stiffness) < 0.01 and max(zeros) < 20e-6  # without regard to it: 0.047 and 183e-6
 
 
 def test_springs_and_play_that_are_described_are_not_off() -> None:

@@ -6,9 +6,11 @@ measured around a smooth curve, is taken out of their moments, else large noise 
 (W. A. Fuller, Measurement Error Models, 1987, sec. 2.2). The speeds of x0 and f0 are further columns, so that sensors
 that are read some milliseconds apart do no harm. Behind edges and pulleys a cord bears less than f0 and stretches less,
 by a share of f0 that follows which way it moved last: a stop operator of the travel at each level, times f0, is a
-further column. The intervals are those of sums over blocks of 2 s, so that they hold for correlated residuals, too.
-Recordings of a reference are regressed together with those of now: arms, 1/k and zero are free in both, and what the
-equation lacks (curves) is shared, so that another load or range is no change.
+further column. Cords creep: a part of the stretch follows the force within seconds. Where that shows, by how much slow
+stretches are behind the force are further columns: k is that of a load at rest, and a mean stretch is no zero. The
+intervals are those of sums over blocks of 2 s, so that they hold for correlated residuals, too. Recordings of a
+reference are regressed together with those of now: arms, 1/k and zero are free in both, and what the equation lacks
+(curves) is shared, so that another load or range is no change.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 
 import numpy as np
+from scipy.signal import lfilter
 
 from tendonfmu.arrays import Flags, Indices, Numbers
 from tendonfmu.errors import InputError
@@ -40,6 +43,7 @@ KNOWN = 0.3  # of a number; one with a wider interval is not determined
 OTHER = 0.002, 0.01, 1e-3  # by which an arm, a stiffness (of the number) and an angle (rad) differ from the described
 LARGEST = 4.0, 30.0  # times the described arm or stiffness, or that part of it: beyond, columns are wrong
 TURN = 0.001  # of the range of a travel, over which friction turns round; above the noise of angles
+CREEP = 1.0, 3.0, 10.0  # s, of slow stretches: longer than strokes, shorter than recordings; any time is a mixture
 SLOW = 0.02  # s, between samples of what turns round
 RIGID = 1e-6  # of the motion of a position: a smaller stretch is none
 LEAST_DRIFT = 5e-6  # s/s of a clock against another
@@ -247,6 +251,7 @@ class _Samples:
     angle: Numbers
     position_speed: Numbers
     force_speed: Numbers
+    behind: Numbers  # [N, m, times] how far slow stretches of the cords are behind the forces, N
     force_noise: Numbers
     angle_noise: Numbers
     held: Numbers  # [N, m, levels] what friction on the way may hold of each force
@@ -270,6 +275,7 @@ def _samples(recording: Recording, side: int, arms: Numbers) -> _Samples | None:
         groups["joint_position"][rows],
         smooth_speeds(time, groups["tendon_position"])[rows],
         smooth_speeds(time, groups["tendon_force"])[rows],
+        _behind(time, groups["tendon_force"])[rows],
         noise["tendon_force"],
         noise["joint_position"],
         held_on_the_way(recording, arms)[rows],
@@ -332,6 +338,19 @@ def smooth_speeds(time: Numbers, values: Numbers) -> Numbers:
     return speeds
 
 
+def _behind(time: Numbers, force: Numbers) -> Numbers:
+    """Return how far the slow stretches of the cords are behind the forces [N, m, times], N; none after a gap."""
+    behind = np.zeros((*force.shape, len(CREEP)))
+    for begin, end in pairwise([0, *gaps(time), len(time)]):
+        if end - begin >= FEWEST:
+            step = float(np.median(np.diff(time[begin:end])))
+            smooth = zero_phase(force[begin:end], SPEED_CUTOFF, 1.0 / step)
+            for k, kept in enumerate(np.exp(-step / np.array(CREEP))):
+                slow, _ = lfilter([1.0 - kept], [1.0, -kept], smooth, axis=0, zi=kept * smooth[:1])
+                behind[begin:end, :, k] = slow - smooth
+    return behind
+
+
 def _span(values: Numbers) -> Numbers:
     """Return the middle and half of the range of columns [2, c]."""
     low, high = np.quantile(values, [0.01, 0.99], axis=0)
@@ -362,7 +381,8 @@ def _of_tendon(
         return None
     own = np.column_stack([samples.angle[:, joints], samples.force[:, i]])[taut]
     held = samples.held[taut][:, [i, *seen_from]].reshape(len(block), -1)
-    held = held[:, held.any(axis=0) & (len(np.unique(block)) > FEWEST_BLOCKS + BLOCKS_PER_COLUMN * held.shape[1])]
+    many = len(np.unique(block))
+    held = held[:, held.any(axis=0) & (many > FEWEST_BLOCKS + BLOCKS_PER_COLUMN * held.shape[1])]
     shared = np.column_stack(
         [
             samples.position_speed[:, i],
@@ -377,18 +397,30 @@ def _of_tendon(
     noise_shared = np.array([0.0, 0.0, 0.0, *samples.force_noise[list(seen_from)], *np.zeros(held.shape[1])])
     count, position = len(joints), samples.position[taut, i]
     span = _span(own)
-    degree, many = DEGREE if sides > 1 else 1, len(np.unique(block))
+    degree = DEGREE if sides > 1 else 1
     while degree > 1 and many < BLOCKS_PER_COLUMN * own.shape[1] * (sides + degree - 1):
         degree -= 1
     lacking = curves(own, span, degree)
 
-    def regression(own: Numbers, lacking: Numbers) -> Estimate | None:
-        columns = np.column_stack([*([own] * sides), shared, lacking])
+    def regression(own: Numbers, lacking: Numbers, behind: Numbers) -> Estimate | None:
+        columns = np.column_stack([*([own] * sides), shared, behind, lacking])
         variance = np.append(noise, np.zeros(own.shape[1] - len(noise)))
-        all_noise = np.array([*np.tile(variance, sides), *noise_shared, *np.zeros(lacking.shape[1])])
+        free = np.zeros(behind.shape[1] + lacking.shape[1])
+        all_noise = np.array([*np.tile(variance, sides), *noise_shared, *free])
         return noisy_regression(columns, all_noise, position, block, side, own.shape[1])
 
-    found = regression(own, lacking)
+    first = own.shape[1] * sides
+    behind = samples.behind[taut, i]
+    # Without encoders the cords of the other tendons creep, too: more than a motion can tell apart.
+    creeps = not seen_from and many > FEWEST_BLOCKS + BLOCKS_PER_COLUMN * (held.shape[1] + len(CREEP))
+    if creeps:  # of whatever time: it shows in a column of the middle one
+        one = regression(own, lacking, behind[:, [len(CREEP) // 2]])
+        slow, half, _ = one.difference(first + shared.shape[1]) if one is not None else (0.0, 0.0, 1.0)
+        creeps = slow > CERTAIN * half
+    found = regression(own, lacking, behind) if creeps else None
+    if found is None:
+        behind = behind[:, :0]
+        found = regression(own, lacking, behind)
     if found is None:
         return None
     first = own.shape[1] * sides
@@ -413,7 +445,7 @@ def _of_tendon(
     at_zero, given = ("zero", -sides, -1, float(tendon.get("zero") or 0.0), OTHER[2] * arm), None
     zero = learned(*at_zero)
     if sides > 1 and stiffness.differs:  # what is not linear in it is another, too, and with it where its force is 0
-        given = regression(np.column_stack([own, own[:, -1] ** 2]), curves(own[:, :-1], span[:, :-1], degree))
+        given = regression(np.column_stack([own, own[:, -1] ** 2]), curves(own[:, :-1], span[:, :-1], degree), behind)
     if given is not None:
         bent = learned(*at_zero, given)
         zero = replace(bent, described=zero.described, value=zero.described + bent.off)
@@ -422,7 +454,7 @@ def _of_tendon(
         {j: replace(each, is_known=each.half < KNOWN * abs(each.value)) for j, each in arms_of.items()},
         stiffness,
         replace(zero, is_known=is_whole and zero.half < KNOWN * arm),
-        dict(_varying(lambda squares: regression(own, squares), own, joints)) if sides == 1 else {},
+        dict(_varying(lambda squares: regression(own, squares, behind), own, joints)) if sides == 1 else {},
         Learned("time", -drift, drift_half, 0.0, bool(np.isfinite(drift_half)), LEAST_DRIFT),
         span,
     )
