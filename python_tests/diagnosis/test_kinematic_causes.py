@@ -62,6 +62,7 @@ def test_each_is_named_alone(
     (cause,) = found(FINGER.but(what, size, tendon=1, joint=0), FINGER if with_reference else None).causes
     assert placed([cause]) == [(effect, joint, tendon)]
     assert words in cause.size and cause.gain.low > 0.5 and cause.p_value < 1e-6 and cause.gain_unit == "m"
+    assert (cause.title == "a tendon's stiffness is off") == (what == "stiffness")
     assert (cause.changed is not None) == with_reference
     if cause.changed is not None and what in ("encoder", "zero"):
         assert cause.changed.change.value == pytest.approx(size, rel=0.02)
@@ -92,6 +93,7 @@ def test_a_coupling_and_several_places() -> None:
     now = FINGER.but("coupling", 5e-4, tendon=1, joint=1).but("zero", 2e-4, tendon=0).but("zero", -1e-4, tendon=3)
     causes = found(now, FINGER).causes
     assert sorted(placed(causes), key=str) == [("joint_coupling", 2, 2), ("zero", None, None)]
+    assert "a tendon moves with a joint that it does not pass" in [cause.title for cause in causes]
     (zeros,) = (cause for cause in causes if cause.effect == "zero")
     assert [place.tendon for place in zeros.places] == [1, 4] and "at the largest of 2 places" in zeros.size
 

@@ -49,13 +49,15 @@ EXPLANATIONS = {
     'encoder to zero again, or write its offset into the map of columns ("offset" at joint_position).',
     ZERO: "This tendon's motor reads another position than the joints and the other tendons show: the tendon has "
     "slipped on its drum, was attached again, or its motor lost its count. The extended model has its zero.",
-    "moment_arm": "The tendon moves more or less per angle of this joint than described. Measure the pulley's radius "
+    ARM: "The tendon moves more or less per angle of this joint than described. Measure the pulley's radius "
     "and add half the tendon's thickness; look whether the tendon runs on its pulley. The extended model has the arm.",
-    "tendon_nonlinearity": "The tendon stretches more or less under its force than described: another tendon, one "
+    SPRING: "The tendon stretches more or less under its force than described: another tendon, one "
     "that is worn, or the gain of its force sensor. The extended model has the stiffness.",
-    "joint_coupling": "The tendon moves with a joint that it does not pass in the description: it passes beside the "
+    COUPLING: "The tendon moves with a joint that it does not pass in the description: it passes beside the "
     "joint's axis. The extended model has the moment arm.",
 }
+# The tables of effects describe a spring that is not linear, and a spring between joints.
+TITLES = {SPRING: "a tendon's stiffness is off", COUPLING: "a tendon moves with a joint that it does not pass"}
 
 
 def _size(effect: str, size: ChangedSize, is_change: bool) -> str:
@@ -320,7 +322,7 @@ def _causes(
         at_largest = f", at the largest of {len(own)} places" if len(own) > 1 else ""
         yield Cause(
             where,
-            title_of(effect),
+            TITLES.get(effect) or title_of(effect),
             EXPLANATIONS[effect],
             p_value=min(1.0, max(each.number.p_value for each in own) * len(known)),
             gain=gain_of(own),
