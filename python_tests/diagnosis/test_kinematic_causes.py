@@ -50,7 +50,7 @@ def placed(causes: Sequence[Cause]) -> list[tuple[str, int | None, int | None]]:
     [
         ("encoder", np.radians(3.0), "encoder_offset", 1, None, "it reads 3° more than"),
         ("encoder", -np.radians(1.0), "encoder_offset", 1, None, "° less than"),
-        ("zero", 3e-4, "zero", None, 2, "+0.3\xa0mm"),
+        ("zero", 1.5e-4, "zero", None, 2, "+0.15\xa0mm"),
         ("arm", 0.035, "moment_arm", 1, 2, "+3.5\xa0%"),
         ("stiffness", 0.1, "tendon_nonlinearity", None, 2, "+10\xa0%"),
     ],

@@ -44,6 +44,7 @@ OTHER = 0.002, 0.01, 1e-3  # by which an arm, a stiffness (of the number) and an
 LARGEST = 4.0, 30.0  # times the described arm or stiffness, or that part of it: beyond, columns are wrong
 TURN = 0.001  # of the range of a travel, over which friction turns round; above the noise of angles
 CREEP = 1.0, 3.0, 10.0  # s, of slow stretches: longer than strokes, shorter than recordings; any time is a mixture
+CANCEL = 2.0  # times the sum of parts of a creep: all are above 0 but for their errors
 SLOW = 0.02  # s, between samples of what turns round
 RIGID = 1e-6  # of the motion of a position: a smaller stretch is none
 LEAST_DRIFT = 5e-6  # s/s of a clock against another
@@ -409,18 +410,17 @@ def _of_tendon(
         all_noise = np.array([*np.tile(variance, sides), *noise_shared, *free])
         return noisy_regression(columns, all_noise, position, block, side, own.shape[1])
 
-    first = own.shape[1] * sides
-    behind = samples.behind[taut, i]
+    found, behind = regression(own, lacking, np.zeros((len(block), 0))), samples.behind[taut, i]
     # Without encoders the cords of the other tendons creep, too: more than a motion can tell apart.
     creeps = not seen_from and many > FEWEST_BLOCKS + BLOCKS_PER_COLUMN * (held.shape[1] + len(CREEP))
-    if creeps:  # of whatever time: it shows in a column of the middle one
-        one = regression(own, lacking, behind[:, [len(CREEP) // 2]])
-        slow, half, _ = one.difference(first + shared.shape[1]) if one is not None else (0.0, 0.0, 1.0)
-        creeps = slow > CERTAIN * half
-    found = regression(own, lacking, behind) if creeps else None
-    if found is None:
-        behind = behind[:, :0]
-        found = regression(own, lacking, behind)
+    if creeps:  # of whatever time: it shows in a column of the middle one, and in parts that do not cancel
+        at = own.shape[1] * sides + shared.shape[1]
+        one, whole = (regression(own, lacking, each) for each in (behind[:, [len(CREEP) // 2]], behind))
+        slow, half, _ = one.difference(at) if one is not None else (0.0, 0.0, 1.0)
+        parts = whole.value[at : at + len(CREEP)] if whole is not None else np.zeros(1)
+        creeps = slow > CERTAIN * half and np.abs(parts).sum() < CANCEL * parts.sum()
+        found = whole if creeps else found
+    behind = behind if creeps else behind[:, :0]
     if found is None:
         return None
     first = own.shape[1] * sides
