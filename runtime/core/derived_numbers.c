@@ -207,11 +207,13 @@ static void derive_flags(tendonfmu_finger* f) {
   }
 }
 
-void forget_views(tendonfmu_finger* finger) {
-  for (size_t k = 0; k < finger->slots / 4; ++k) {
-    for (size_t lane = 0; lane < 4; ++lane) {
-      finger->scratch.view[k].key[lane] = -1.0;
-    }
+void recall_sample(tendonfmu_finger* f) {
+  memcpy(f->next, f->state + (f->state_count - f->next_count), f->next_count * sizeof(double));
+  if (f->derived.settings.watches_sensors) {
+    use_rows(f, f->remembered.sensor.fault);
+  }
+  for (size_t slot = 0; slot < f->slots; ++slot) {
+    f->scratch.view[slot / 4].key[slot % 4] = -1.0;
   }
 }
 
@@ -239,8 +241,7 @@ void derive_numbers(tendonfmu_finger* finger, int routing_changed) {
     find_what_can_hold(finger);
   }
   find_extensions(finger);
-  recall_rows(finger);
-  forget_views(finger);
+  recall_sample(finger);
 }
 
 void take_prepared_numbers(tendonfmu_finger* finger, const tendonfmu_finger* prepared) {
@@ -249,8 +250,7 @@ void take_prepared_numbers(tendonfmu_finger* finger, const tendonfmu_finger* pre
   finger->memory.compliance = prepared->memory.compliance;
   finger->memory.relaxes = prepared->memory.relaxes;
   finger->memory.step = prepared->memory.step;
-  recall_rows(finger);
-  forget_views(finger);
+  recall_sample(finger);
 }
 
 /* --- the laws in force at a slot ---------------------------------------------------------------------------------- */

@@ -53,7 +53,7 @@ static void pass_signals(const tendonfmu_finger* f, effect_signals* direction, i
   direction->late = late;
   for (size_t r = 0; r < f->extensions.signals; ++r) {
     const extension_row* row = signal_row(f, r);
-    row->effect->signal_pass(row->place, row->parameters, row->memory, direction);
+    row->action->signal_pass(row, direction);
   }
 }
 
@@ -292,13 +292,15 @@ static double motion_at(const linearisation* l, size_t slot) {
 /* adds what friction as a torque owes to how it builds up at its places */
 static void add_followed(const linearisation* l, const extension_row* row, const effect_sample* sample, double* slope) {
   const tendonfmu_finger* f = l->finger;
-  const double size = row->effect->size(row->place, row->parameters, sample);
+  const double size = row->action->size(row, sample);
   double slopes[MODEL_MAX_JOINTS] = {0.0};
+  extension_row built_up = *row;
+  built_up.now = slopes;
   for (size_t k = 0; k < row->memory_count; ++k) {
-    const size_t slot = row->effect->slot(row->place, f->joints, f->tendon_lanes, k);
+    const size_t slot = row->action->slot(row, f->joints, f->tendon_lanes, k);
     slopes[k] = follower_slope(f, row, k, size) * motion_at(l, slot);
   }
-  row->effect->torque(row->place, row->parameters, sample, slopes, slope);
+  row->action->torque(&built_up, sample, slope);
 }
 
 /* slope of what torque rows add to the limits of joints whose friction has a memory */
@@ -308,11 +310,12 @@ static void linearise_limits(linearisation* l, const double* force) {
   const effect_sample sample = remembered_sample(f);
   const effect_direction direction = {.force = force};
   for (size_t r = 0; r < f->extensions.torques; ++r) {
-    const extension_row* row = torque_row(f, r);
-    const size_t slot = row->effect->slot ? row->effect->slot(row->place, f->joints, f->tendon_lanes, 0) : 0;
+    extension_row row = *torque_row(f, r);
+    const size_t slot = row.action->slot ? row.action->slot(&row, f->joints, f->tendon_lanes, 0) : 0;
     if (slot >= joint_row && remembers_at(f, slot)) {
-      const double whole = 1.0;
-      row->effect->slope(row->place, row->parameters, &sample, &whole, &direction, l->own_limit);
+      double whole = 1.0;
+      row.now = &whole;
+      row.action->slope(&row, &sample, &direction, l->own_limit);
     }
   }
 }
@@ -332,10 +335,10 @@ static void linearise_extensions(linearisation* l, const double* force) {
   const effect_direction direction = {.angle = angle, .velocity = velocity, .force = force};
   for (size_t r = 0; r < f->extensions.torques; ++r) {
     const extension_row* row = torque_row(f, r);
-    if (row->effect->slope) {
-      row->effect->slope(row->place, row->parameters, &sample, row->memory, &direction, slope);
+    if (row->action->slope) {
+      row->action->slope(row, &sample, &direction, slope);
     }
-    if (row->effect->slot && f->memory.elements) {
+    if (row->action->slot && f->memory.elements) {
       add_followed(l, row, &sample, slope);
     }
   }

@@ -26,12 +26,12 @@ static size_t note_kind(tendonfmu_finger* f, effect_kind kind, int order, size_t
     const effect_type* effect = effect_of(f, i);
     const effect_place place = model_extension_place(&f->shape, i);
     const size_t own = model_extension_memory(effect, &f->shape, place);
-    if (effect->kind == kind && effect->order == order) {
-      f->extensions.row[found++] = (extension_row){.effect = effect,
+    if (effect->action->kind == kind && effect->action->order == order) {
+      f->extensions.row[found++] = (extension_row){.action = effect->action,
                                                    .place = place,
                                                    .parameters = numbers,
-                                                   .memory = own ? f->remembered.extension + memory : NULL,
-                                                   .next = own ? f->scratch.extension + memory : NULL,
+                                                   .before = own ? f->remembered.extension + memory : NULL,
+                                                   .now = own ? f->scratch.extension + memory : NULL,
                                                    .memory_count = own};
     }
     numbers += effect->parameter_count;
@@ -85,51 +85,49 @@ void find_extensions(tendonfmu_finger* f) {
 /* --- what the others remember ---------------------------------------------------------------------------------------
  */
 
+/* of the finger alone */
+static effect_sample sample_of_finger(const tendonfmu_finger* f) {
+  return (effect_sample){.joints = f->joints,
+                         .tendons = f->tendons,
+                         .lanes = f->tendon_lanes,
+                         .source = source_of(f),
+                         .moment_arm = f->derived.moment_arm,
+                         .rest_angle = f->derived.cover_rest,
+                         .axis_cosine = f->derived.axis_cosine,
+                         .tendon_threshold = f->derived.settings.tendon_threshold,
+                         .joint_threshold = f->derived.settings.joint_threshold};
+}
+
 void advance_extensions(tendonfmu_finger* f, double time, double step) {
   const finger_scratch* s = &f->scratch;
   const size_t others = f->extensions.signals + f->extensions.friction + f->extensions.torques;
-  f->scratch.sample = (effect_sample){.joints = f->joints,
-                                      .tendons = f->tendons,
-                                      .lanes = f->tendon_lanes,
-                                      .first = is_first(f),
-                                      .source = source_of(f),
-                                      .time = time,
-                                      .step = step,
-                                      .angle = s->angle,
-                                      .velocity = s->velocity + f->joints * f->tendon_lanes,
-                                      .tendon_velocity = s->velocity,
-                                      .force = s->force,
-                                      .moment_arm = f->derived.moment_arm,
-                                      .rest_angle = f->derived.cover_rest,
-                                      .axis_cosine = f->derived.axis_cosine,
-                                      .tendon_threshold = f->derived.settings.tendon_threshold,
-                                      .joint_threshold = f->derived.settings.joint_threshold};
+  effect_sample* sample = &f->scratch.sample;
+  *sample = sample_of_finger(f);
+  sample->first = is_first(f);
+  sample->time = time;
+  sample->step = step;
+  sample->angle = s->angle;
+  sample->velocity = s->velocity + f->joints * f->tendon_lanes;
+  sample->tendon_velocity = s->velocity;
+  sample->force = s->force;
   for (size_t r = f->extensions.signals; r < others; ++r) {
     const extension_row* row = f->extensions.row + r;
-    if (row->effect->advance) {
-      row->effect->advance(row->place, row->parameters, &s->sample, row->memory, row->next);
+    if (row->action->advance) {
+      row->action->advance(row, sample);
     }
-    if (row->effect->slot && f->memory.elements) {
-      follow_elements(f, row, row->effect->size(row->place, row->parameters, &s->sample));
+    if (row->action->slot && f->memory.elements) {
+      follow_elements(f, row, row->action->size(row, sample));
     }
   }
 }
 
 effect_sample remembered_sample(const tendonfmu_finger* f) {
-  effect_sample sample = {.joints = f->joints,
-                          .tendons = f->tendons,
-                          .lanes = f->tendon_lanes,
-                          .first = f->remembered.scalar[STATE_FIRST_SAMPLE] != 0.0,
-                          .source = source_of(f),
-                          .time = f->remembered.scalar[STATE_TIME],
-                          .angle = f->remembered.angle,
-                          .velocity = f->remembered.speed,
-                          .force = f->remembered.force,
-                          .moment_arm = f->derived.moment_arm,
-                          .rest_angle = f->derived.cover_rest,
-                          .axis_cosine = f->derived.axis_cosine,
-                          .tendon_threshold = f->derived.settings.tendon_threshold,
-                          .joint_threshold = f->derived.settings.joint_threshold};
+  effect_sample sample = sample_of_finger(f);
+  sample.first = f->remembered.scalar[STATE_FIRST_SAMPLE] != 0.0;
+  sample.time = f->remembered.scalar[STATE_TIME];
+  sample.angle = f->remembered.angle;
+  sample.velocity = f->remembered.speed;
+  sample.force = f->remembered.force;
   return sample;
 }
 
@@ -151,7 +149,7 @@ void shape_signals(tendonfmu_finger* f, double time, int late) {
                             .inverse_stiffness = f->derived.inverse_stiffness};
   for (size_t n = 0; n < f->extensions.signals; ++n) {
     const extension_row* row = signal_row(f, n);
-    row->effect->signal(row->place, row->parameters, &signals, row->memory, row->next);
+    row->action->signal(row, &signals);
   }
 }
 
@@ -198,7 +196,7 @@ double slot_grip_of(const tendonfmu_finger* f, size_t slot) {
     const extension_row* row = friction_row(f, r);
     size_t member;
     if (friction_acts_on(f, row, slot, &member)) {
-      value *= row->effect->grip(row->place, row->parameters, row->memory, member).value;
+      value *= row->action->grip(row, member).value;
     }
   }
   return value;
@@ -210,7 +208,7 @@ double slot_grip_slope(const tendonfmu_finger* f, size_t slot, double velocity) 
     const extension_row* row = friction_row(f, r);
     size_t member;
     if (friction_acts_on(f, row, slot, &member)) {
-      const effect_grip own = row->effect->grip(row->place, row->parameters, row->memory, member);
+      const effect_grip own = row->action->grip(row, member);
       slope = slope * own.value + value * own.by_velocity * velocity;
       value *= own.value;
     }
@@ -223,7 +221,7 @@ static void grip_row(tendonfmu_finger* f, const extension_row* row) {
   const size_t members = friction_members(f, row->place);
   for (size_t k = 0; k < members; ++k) {
     const size_t slot = friction_slot(f, row->place, k);
-    const double value = row->effect->grip(row->place, row->parameters, row->next, k).value;
+    const double value = row->action->grip(row, k).value;
     s->grip[slot] *= value;
     s->bias_grip[slot] *= value;
   }
@@ -258,6 +256,6 @@ void grip_jumps(tendonfmu_finger* f) {
 void add_extension_torques(tendonfmu_finger* f) {
   for (size_t r = 0; r < f->extensions.torques; ++r) {
     const extension_row* row = torque_row(f, r);
-    row->effect->torque(row->place, row->parameters, &f->scratch.sample, row->next, f->scratch.friction);
+    row->action->torque(row, &f->scratch.sample, f->scratch.friction);
   }
 }

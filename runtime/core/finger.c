@@ -11,7 +11,6 @@
 #include "kernel_choice.h"
 #include "message.h"
 #include "parameters.h"
-#include "sensor_fault.h"
 #include "step.h"
 
 #ifndef TENDONFMU_VERSION
@@ -198,7 +197,7 @@ tendonfmu_status tendonfmu_set_kinematics_source(tendonfmu_finger* finger, int s
     return fail(finger, TENDONFMU_WRONG_ORDER, "kinematics_source is fixed once the first sample is taken");
   }
   finger->remembered.scalar[STATE_SOURCE] = source;
-  recall_rows(finger); /* measured angles need none */
+  recall_sample(finger); /* measured angles need no rows */
   return TENDONFMU_OK;
 }
 
@@ -214,8 +213,7 @@ static tendonfmu_status take(tendonfmu_finger* finger, double time, const tendon
     case SAMPLE_OVERFLOWS:
       message_write(error_line(finger),
                     "the sample at time %g s overflows: expected forces and velocities whose torques are finite", time);
-      recall_rows(finger);
-      forget_views(finger); /* they follow its velocities, which nothing else remembers */
+      recall_sample(finger);
       break;
     default: return TENDONFMU_OK;
   }
@@ -620,6 +618,6 @@ tendonfmu_status tendonfmu_set_kernel(tendonfmu_finger* finger, const char* name
                 "processor and build have it");
   }
   finger->kernel = kernel;
-  forget_views(finger); /* the kernels fill them by one or by four */
+  recall_sample(finger); /* the kernels fill views by one or by four */
   return TENDONFMU_OK;
 }

@@ -42,15 +42,6 @@ typedef struct finger_settings {
   double position_resolution;                           /* m */
 } finger_settings;
 
-/* One row of the description's extensions. */
-typedef struct extension_row {
-  const effect_type* effect;
-  effect_place place;
-  const double* parameters;
-  double *memory, *next; /* as the last sample left it; as the present one will */
-  size_t memory_count;   /* of the effect itself */
-} extension_row;
-
 /* The rows by what they act on, each part in the description's order: signals, friction, torques, memory. */
 typedef struct extension_rows {
   extension_row* row;
@@ -400,8 +391,9 @@ void derive_numbers(tendonfmu_finger* finger, int routing_changed);
 /* Copies parameters and all that follows from them, of a finger of the same image. */
 void take_prepared_numbers(tendonfmu_finger* finger, const tendonfmu_finger* prepared);
 
-/* Makes the next sample look at all laws anew. */
-void forget_views(tendonfmu_finger* finger);
+/* What scratch keeps between samples, from the state: after parameters, state or kernel changed, or a sample was
+ * refused half way. The next sample looks at all laws anew. */
+void recall_sample(tendonfmu_finger* finger);
 
 /* --- the laws in force at a slot (derived_numbers.c): the side by the sign of its velocity, the working points by the
  * joint angle --- */

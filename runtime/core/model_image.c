@@ -117,7 +117,8 @@ effect_place model_extension_place(const model_shape* shape, uint32_t index) {
 }
 
 size_t model_extension_memory(const effect_type* effect, const model_shape* shape, effect_place place) {
-  return effect->state_count ? effect->state_count(shape->joints, shape->tendons, place) : effect->memory_count;
+  const effect_action* action = effect->action;
+  return action->state_count ? action->state_count(shape->joints, shape->tendons, place) : action->memory_count;
 }
 
 static void walk_extensions(walk* w) {
@@ -342,10 +343,10 @@ static int check_extension(const unsigned char* table, uint32_t i, model_shape* 
   if (same > (uint32_t)effect->most) {
     return message_write(message, "model image with more extensions of one effect at a place than that may have");
   }
-  if (effect == &effect_presliding && same > shape->elements) {
+  if (effect->action == &presliding_action && same > shape->elements) {
     shape->elements = same;
   }
-  shape->stretches |= effect == &effect_cord_stretch;
+  shape->stretches |= effect->action == &cord_stretch_action;
   shape->extension_memory += model_extension_memory(effect, shape, stored_place(row));
   return 0;
 }

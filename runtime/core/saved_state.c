@@ -7,7 +7,6 @@
 
 #include "bytes.h"
 #include "parameters.h"
-#include "sensor_fault.h"
 
 enum { HEADER_BYTES = 40, HASHED_FROM = 32, STATE_VERSION = 4 };
 
@@ -135,7 +134,6 @@ int restore_state(tendonfmu_finger* finger, const void* bytes, message_line mess
     memcpy(finger->parameters, finger->candidate, p * sizeof(double));
     derive_numbers(finger, 1);
   }
-  recall_rows(finger);
-  forget_views(finger); /* they follow the side of the last moving sample, which is another one now */
+  recall_sample(finger);
   return 0;
 }

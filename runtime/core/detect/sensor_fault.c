@@ -63,12 +63,6 @@ void use_rows(tendonfmu_finger* f, const double* fault) {
   }
 }
 
-void recall_rows(tendonfmu_finger* f) {
-  if (f->derived.settings.watches_sensors) {
-    use_rows(f, f->remembered.sensor.fault);
-  }
-}
-
 /* whether the torque of joint j, or its friction, reads the force of tendon i; joints with load friction read all */
 static int joint_reads(const tendonfmu_finger* f, size_t j, size_t i) {
   const int has_load_friction = (f->shape.words[j] >> 3 & 3) != LAW_ABSENT;

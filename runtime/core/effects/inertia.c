@@ -8,33 +8,31 @@
 
 enum { VELOCITY, ACCELERATION, STEP, NUMBERS_REMEMBERED }; /* STEP: 0 at the first sample */
 
-static void advance(effect_place place, const double* parameters, const effect_sample* sample, const double* before,
-                    double* after) {
-  (void)parameters;
-  const double velocity = sample->velocity[place.joint];
-  after[ACCELERATION] = sample->first ? 0.0 : (velocity - before[VELOCITY]) / sample->step;
-  after[STEP] = sample->first ? 0.0 : sample->step;
-  after[VELOCITY] = velocity;
+static void advance(const extension_row* row, const effect_sample* sample) {
+  const double velocity = sample->velocity[row->place.joint];
+  row->now[ACCELERATION] = sample->first ? 0.0 : (velocity - row->before[VELOCITY]) / sample->step;
+  row->now[STEP] = sample->first ? 0.0 : sample->step;
+  row->now[VELOCITY] = velocity;
 }
 
-static void constant_torque(effect_place place, const double* parameters, const effect_sample* sample,
-                            const double* memory, double* torque) {
+static void constant_torque(const extension_row* row, const effect_sample* sample, double* torque) {
   (void)sample;
-  torque[place.joint] += parameters[0] * memory[ACCELERATION];
+  torque[row->place.joint] += row->parameters[0] * row->now[ACCELERATION];
 }
 
-static void constant_slope(effect_place place, const double* parameters, const effect_sample* sample,
-                           const double* memory, const effect_direction* direction, double* slope) {
+static void constant_slope(const extension_row* row, const effect_sample* sample, const effect_direction* direction,
+                           double* slope) {
   (void)sample;
-  if (memory[STEP] > 0.0) {
-    slope[place.joint] += parameters[0] * direction->velocity[place.joint] / memory[STEP];
+  if (row->now[STEP] > 0.0) {
+    slope[row->place.joint] += row->parameters[0] * direction->velocity[row->place.joint] / row->now[STEP];
   }
 }
 
-const effect_type effect_inertia = {
-    INERTIA_FACTS,      .kind = EFFECT_TORQUE,     .memory_count = NUMBERS_REMEMBERED,
-    .advance = advance, .torque = constant_torque, .slope = constant_slope,
-};
+const effect_action inertia_action = {.kind = EFFECT_TORQUE,
+                                      .memory_count = NUMBERS_REMEMBERED,
+                                      .advance = advance,
+                                      .torque = constant_torque,
+                                      .slope = constant_slope};
 
 /* --- inertia_variation: what turns about a joint comes nearer to its axis as the next joint, whose axis is
  * perpendicular, turns: I = sine·sin 2q_{j+1} + cosine·cos 2q_{j+1}, beside a constant. From the energy ½·I·q̇_j²: T_j =
@@ -65,27 +63,28 @@ static void slope_by_numbers(effect_place place, const effect_sample* sample, do
   after[NEXT + COSINE] = at.cosine * v * v * turn + 2.0 * at.sine * v * v_slope;
 }
 
-static void add_torques(effect_place place, const double* parameters, const double* by_number, double* torque) {
-  torque[place.joint] += parameters[SINE] * by_number[OWN + SINE] + parameters[COSINE] * by_number[OWN + COSINE];
-  torque[place.joint + 1] += parameters[SINE] * by_number[NEXT + SINE] + parameters[COSINE] * by_number[NEXT + COSINE];
+static void add_torques(const extension_row* row, const double* by_number, double* torque) {
+  const double sine = row->parameters[SINE], cosine = row->parameters[COSINE];
+  torque[row->place.joint] += sine * by_number[OWN + SINE] + cosine * by_number[OWN + COSINE];
+  torque[row->place.joint + 1] += sine * by_number[NEXT + SINE] + cosine * by_number[NEXT + COSINE];
 }
 
-static void varied_torque(effect_place place, const double* parameters, const effect_sample* sample,
-                          const double* memory, double* torque) {
+static void varied_torque(const extension_row* row, const effect_sample* sample, double* torque) {
   double by_number[NUMBERS];
-  by_numbers(place, sample, memory[ACCELERATION], by_number);
-  add_torques(place, parameters, by_number, torque);
+  by_numbers(row->place, sample, row->now[ACCELERATION], by_number);
+  add_torques(row, by_number, torque);
 }
 
-static void varied_slope(effect_place place, const double* parameters, const effect_sample* sample,
-                         const double* memory, const effect_direction* direction, double* slope) {
+static void varied_slope(const extension_row* row, const effect_sample* sample, const effect_direction* direction,
+                         double* slope) {
   double by_number[NUMBERS];
-  const double a_slope = memory[STEP] > 0.0 ? direction->velocity[place.joint] / memory[STEP] : 0.0;
-  slope_by_numbers(place, sample, memory[ACCELERATION], a_slope, direction, by_number);
-  add_torques(place, parameters, by_number, slope);
+  const double a_slope = row->now[STEP] > 0.0 ? direction->velocity[row->place.joint] / row->now[STEP] : 0.0;
+  slope_by_numbers(row->place, sample, row->now[ACCELERATION], a_slope, direction, by_number);
+  add_torques(row, by_number, slope);
 }
 
-const effect_type effect_inertia_variation = {
-    INERTIA_VARIATION_FACTS, .kind = EFFECT_TORQUE,   .memory_count = NUMBERS_REMEMBERED,
-    .advance = advance,      .torque = varied_torque, .slope = varied_slope,
-};
+const effect_action inertia_variation_action = {.kind = EFFECT_TORQUE,
+                                                .memory_count = NUMBERS_REMEMBERED,
+                                                .advance = advance,
+                                                .torque = varied_torque,
+                                                .slope = varied_slope};
