@@ -265,15 +265,27 @@ size_t slot_segment(const tendonfmu_finger* finger, size_t joint, size_t tendon,
   return passed;
 }
 
-effect_laws edge_laws(const tendonfmu_finger* finger, size_t joint, size_t tendon, double angle, double angle_slope) {
+effect_laws edge_laws(const tendonfmu_finger* finger, size_t joint, size_t tendon, dual angle) {
   const derived_numbers* d = &finger->derived;
   const size_t slot = joint * finger->tendon_lanes + tendon;
-  const size_t record = d->edge_record[slot] + slot_segment(finger, joint, tendon, angle);
-  const double* segment = d->edge_segment + 2 * record;
-  return (effect_laws){.below = d->edge_law + record * LAW_NUMBERS,
-                       .above = d->edge_law + (record + 1) * LAW_NUMBERS,
-                       .weight = (angle - segment[0]) * segment[1],
-                       .weight_slope = angle_slope * segment[1]};
+  const size_t record = d->edge_record[slot] + slot_segment(finger, joint, tendon, angle.value);
+  const double *segment = d->edge_segment + 2 * record, *law = d->edge_law + record * LAW_NUMBERS;
+  return (effect_laws){.below = law,
+                       .above = law + LAW_NUMBERS,
+                       .weight = {(angle.value - segment[0]) * segment[1], angle.slope * segment[1]}};
+}
+
+static dual law_at(const double* law, int negative, dual speed) {
+  const law_slopes of = law_with_slopes(law + negative * LAW_SIDE_NUMBERS, speed.value);
+  return (dual){of.value, of.by_speed * speed.slope};
+}
+
+dual magnitude_at(const effect_laws* laws, int negative, dual speed) {
+  const dual below = law_at(laws->below, negative, speed);
+  if (!laws->above) {
+    return below;
+  }
+  return sum(below, product(laws->weight, difference(law_at(laws->above, negative, speed), below)));
 }
 
 static void put_side(double rows[LAW_SIDE_NUMBERS][4], size_t lane, const double* law, int negative) {

@@ -59,6 +59,7 @@ static void find_axis_cosines(tendonfmu_finger* f) {
 static void clear_grips(tendonfmu_finger* f) {
   for (size_t slot = 0; slot < f->slots; ++slot) {
     f->scratch.grip[slot] = 1.0;
+    f->scratch.grip_slope[slot] = 0.0;
     f->scratch.bias_grip[slot] = f->memory.elements && f->memory.remembers[slot] != 0.0 ? 0.0 : 1.0;
   }
 }
@@ -156,14 +157,17 @@ void shape_signals(tendonfmu_finger* f, double time, int late) {
 /* --- friction -------------------------------------------------------------------------------------------------------
  */
 
-size_t friction_members(const tendonfmu_finger* f, effect_place place) {
+/* how many velocities a friction row acts on: of a joint; of a tendon, one a joint; of all tendons, then of all joints
+ */
+static size_t count_members(const tendonfmu_finger* f, effect_place place) {
   if (place.joint != EFFECT_NOWHERE) {
     return 1;
   }
   return place.tendon != EFFECT_NOWHERE ? f->joints : f->joints * (f->tendons + 1);
 }
 
-size_t friction_slot(const tendonfmu_finger* f, effect_place place, size_t k) {
+/* the slot of one of them, as effect_action.grip() counts them */
+static size_t slot_of_member(const tendonfmu_finger* f, effect_place place, size_t k) {
   const size_t lanes = f->tendon_lanes;
   if (place.joint != EFFECT_NOWHERE) {
     return f->joints * lanes + place.joint;
@@ -174,56 +178,15 @@ size_t friction_slot(const tendonfmu_finger* f, effect_place place, size_t k) {
   return k < f->joints * f->tendons ? k / f->tendons * lanes + k % f->tendons : f->joints * (lanes - f->tendons) + k;
 }
 
-int friction_acts_on(const tendonfmu_finger* f, const extension_row* row, size_t slot, size_t* member) {
-  const size_t lanes = f->tendon_lanes, joint_row = f->joints * lanes;
-  const effect_place place = row->place;
-  *member = 0;
-  if (place.joint != EFFECT_NOWHERE) {
-    return slot == joint_row + place.joint;
-  }
-  if (place.tendon != EFFECT_NOWHERE) {
-    *member = slot / lanes;
-    return slot < joint_row && slot % lanes == place.tendon;
-  }
-  const int at_tendon = slot < joint_row;
-  *member = at_tendon ? slot / lanes * f->tendons + slot % lanes : f->joints * f->tendons + slot - joint_row;
-  return at_tendon ? slot % lanes < f->tendons : slot - joint_row < f->joints;
-}
-
-double slot_grip_of(const tendonfmu_finger* f, size_t slot) {
-  double value = 1.0;
-  for (size_t r = 0; r < f->extensions.friction; ++r) {
-    const extension_row* row = friction_row(f, r);
-    size_t member;
-    if (friction_acts_on(f, row, slot, &member)) {
-      value *= row->action->grip(row, member).value;
-    }
-  }
-  return value;
-}
-
-double slot_grip_slope(const tendonfmu_finger* f, size_t slot, double velocity) {
-  double value = 1.0, slope = 0.0;
-  for (size_t r = 0; r < f->extensions.friction; ++r) {
-    const extension_row* row = friction_row(f, r);
-    size_t member;
-    if (friction_acts_on(f, row, slot, &member)) {
-      const effect_grip own = row->action->grip(row, member);
-      slope = slope * own.value + value * own.by_velocity * velocity;
-      value *= own.value;
-    }
-  }
-  return slope;
-}
-
 static void grip_row(tendonfmu_finger* f, const extension_row* row) {
   const finger_scratch* s = &f->scratch;
-  const size_t members = friction_members(f, row->place);
+  const size_t members = count_members(f, row->place);
   for (size_t k = 0; k < members; ++k) {
-    const size_t slot = friction_slot(f, row->place, k);
-    const double value = row->action->grip(row, k).value;
-    s->grip[slot] *= value;
-    s->bias_grip[slot] *= value;
+    const size_t slot = slot_of_member(f, row->place, k);
+    const effect_grip own = row->action->grip(row, k);
+    s->grip_slope[slot] = s->grip_slope[slot] * own.value + s->grip[slot] * own.by_velocity;
+    s->grip[slot] *= own.value;
+    s->bias_grip[slot] *= own.value;
   }
 }
 

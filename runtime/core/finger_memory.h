@@ -266,7 +266,8 @@ typedef struct finger_scratch {
   int angles_determined;    /* no row in use belongs to a failing sensor */
   int unwell;               /* as in the state, after this sample */
   double* extension;        /* the memory of the extensions after this sample */
-  double *grip, *bias_grip; /* [n × M + N] what friction rows make of F and b; with extensions only */
+  double *grip, *grip_slope; /* [n × M + N] what friction rows make of F and b, and ∂/∂v; with extensions only */
+  double* bias_grip;         /* [n × M + N] the same of b: 0 where nothing sticks */
   /* with a memory only */
   double* own_limit;                                 /* [N] N·m, what torque rows add to the limit of a joint */
   double* travelled;                                 /* [n × M + N] Δ */
@@ -354,6 +355,12 @@ static inline const double* inverse_in_use(const tendonfmu_finger* finger) {
   return finger->derived.settings.watches_sensors ? finger->scratch.inverse_routing : finger->derived.inverse_routing;
 }
 
+/* v_min of a slot: m/s, rad/s */
+static inline double threshold_of(const tendonfmu_finger* finger, size_t slot) {
+  const finger_settings* settings = &finger->derived.settings;
+  return slot < finger->joints * finger->tendon_lanes ? settings->tendon_threshold : settings->joint_threshold;
+}
+
 /* Side before the last sample of a slot that rested then, or rests now. */
 static inline double side_before(const tendonfmu_finger* finger, size_t slot) {
   const double event = finger->remembered.event[slot];
@@ -410,7 +417,10 @@ size_t slot_segment(const tendonfmu_finger* finger, size_t joint, size_t tendon,
 /* Laws of one effect: a single one, or those of the segment between two working points. */
 typedef struct effect_laws {
   const double *below, *above; /* above NULL: no working points */
-  double weight, weight_slope; /* of the one above, and along a direction of the angle */
+  dual weight;                 /* of the one above */
 } effect_laws;
 
-effect_laws edge_laws(const tendonfmu_finger* finger, size_t joint, size_t tendon, double angle, double angle_slope);
+effect_laws edge_laws(const tendonfmu_finger* finger, size_t joint, size_t tendon, dual angle);
+
+/* |F| of an effect at a speed >= 0, on its side for v > 0 or v < 0. */
+dual magnitude_at(const effect_laws* laws, int negative, dual speed);

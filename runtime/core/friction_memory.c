@@ -55,8 +55,7 @@ static void set_element(tendonfmu_finger* f, size_t e, size_t slot, effect_place
   const friction_element* to = &f->memory.element[e];
   const size_t joint_row = f->joints * f->tendon_lanes;
   const int own = slot >= joint_row, everywhere = is_everywhere(place);
-  const double threshold = own ? f->derived.settings.joint_threshold : f->derived.settings.tendon_threshold;
-  const double distance = numbers[DISPLACEMENT] * (everywhere ? threshold : 1.0);
+  const double distance = numbers[DISPLACEMENT] * (everywhere ? threshold_of(f, slot) : 1.0);
   const double scale = own && everywhere ? mean_square_arm(f, slot - joint_row) : 1.0;
   const int absolute = numbers[STIFFNESS] > 0.0;
   to->share[slot] = numbers[SHARE];

@@ -31,8 +31,8 @@ tendonfmu_inputs samples_row(const tendonfmu_finger* finger, const tendonfmu_inp
 
 /* --- the derivative of the last sample ---------------------------------------------------------------------------- */
 
-/* direction and derivative as in tendonfmu.h; the finger is initialised and nothing in it changes. */
-void directional_derivative(const tendonfmu_finger* finger, const tendonfmu_inputs* direction,
+/* direction and derivative as in tendonfmu.h; the finger is initialised and nothing in it changes but scratch. */
+void directional_derivative(tendonfmu_finger* finger, const tendonfmu_inputs* direction,
                             const tendonfmu_outputs* derivative);
 
 /* --- saved states ------------------------------------------------------------------------------------------------- */
