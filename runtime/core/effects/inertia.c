@@ -39,48 +39,39 @@ const effect_action inertia_action = {.kind = EFFECT_TORQUE,
  * I·a_j + I'·q̇_{j+1}·q̇_j and T_{j+1} = −½·I'·q̇_j², with I' = dI/dq_{j+1} and a_j as above. */
 
 enum { SINE, COSINE };
-enum { OWN = 0, NEXT = 2, NUMBERS = 4 }; /* torques of both joints by SINE and COSINE */
 
-static void by_numbers(effect_place place, const effect_sample* sample, double a, double* torques) {
-  const sine_cosine at = sine_cosine_of(2.0 * sample->angle[place.joint + 1]);
-  const double v = sample->velocity[place.joint], w = sample->velocity[place.joint + 1];
-  torques[OWN + SINE] = at.sine * a + 2.0 * at.cosine * w * v;
-  torques[OWN + COSINE] = at.cosine * a - 2.0 * at.sine * w * v;
-  torques[NEXT + SINE] = -at.cosine * v * v;
-  torques[NEXT + COSINE] = at.sine * v * v;
-}
+/* I and I'; I'' = −4·I */
+typedef struct variation {
+  double value, by_angle;
+} variation;
 
-/* Their derivative along a direction in which the acceleration a of the sample changes by a_slope. */
-static void slope_by_numbers(effect_place place, const effect_sample* sample, double a, double a_slope,
-                             const effect_direction* direction, double* after) {
-  const sine_cosine at = sine_cosine_of(2.0 * sample->angle[place.joint + 1]);
-  const double v = sample->velocity[place.joint], w = sample->velocity[place.joint + 1];
-  const double v_slope = direction->velocity[place.joint], w_slope = direction->velocity[place.joint + 1];
-  const double turn = 2.0 * direction->angle[place.joint + 1], product = w_slope * v + w * v_slope;
-  after[OWN + SINE] = at.sine * (a_slope - 2.0 * w * v * turn) + at.cosine * (a * turn + 2.0 * product);
-  after[OWN + COSINE] = at.cosine * (a_slope - 2.0 * w * v * turn) - at.sine * (a * turn + 2.0 * product);
-  after[NEXT + SINE] = at.sine * v * v * turn - 2.0 * at.cosine * v * v_slope;
-  after[NEXT + COSINE] = at.cosine * v * v * turn + 2.0 * at.sine * v * v_slope;
-}
-
-static void add_torques(const extension_row* row, const double* by_number, double* torque) {
+static variation variation_at(const extension_row* row, const effect_sample* sample) {
+  const sine_cosine at = sine_cosine_of(2.0 * sample->angle[row->place.joint + 1]);
   const double sine = row->parameters[SINE], cosine = row->parameters[COSINE];
-  torque[row->place.joint] += sine * by_number[OWN + SINE] + cosine * by_number[OWN + COSINE];
-  torque[row->place.joint + 1] += sine * by_number[NEXT + SINE] + cosine * by_number[NEXT + COSINE];
+  return (variation){.value = sine * at.sine + cosine * at.cosine,
+                     .by_angle = 2.0 * (sine * at.cosine - cosine * at.sine)};
 }
 
 static void varied_torque(const extension_row* row, const effect_sample* sample, double* torque) {
-  double by_number[NUMBERS];
-  by_numbers(row->place, sample, row->now[ACCELERATION], by_number);
-  add_torques(row, by_number, torque);
+  const variation of = variation_at(row, sample);
+  const size_t j = row->place.joint;
+  const double v = sample->velocity[j], w = sample->velocity[j + 1];
+  torque[j] += of.value * row->now[ACCELERATION] + of.by_angle * w * v;
+  torque[j + 1] -= 0.5 * of.by_angle * v * v;
 }
 
 static void varied_slope(const extension_row* row, const effect_sample* sample, const effect_direction* direction,
                          double* slope) {
-  double by_number[NUMBERS];
-  const double a_slope = row->now[STEP] > 0.0 ? direction->velocity[row->place.joint] / row->now[STEP] : 0.0;
-  slope_by_numbers(row->place, sample, row->now[ACCELERATION], a_slope, direction, by_number);
-  add_torques(row, by_number, slope);
+  const variation of = variation_at(row, sample);
+  const size_t j = row->place.joint;
+  const double v = sample->velocity[j], w = sample->velocity[j + 1];
+  const double v_slope = direction->velocity[j], w_slope = direction->velocity[j + 1];
+  const double a_slope = row->now[STEP] > 0.0 ? v_slope / row->now[STEP] : 0.0;
+  const double value_slope = of.by_angle * direction->angle[j + 1];
+  const double by_angle_slope = -4.0 * of.value * direction->angle[j + 1];
+  slope[j] += value_slope * row->now[ACCELERATION] + of.value * a_slope + by_angle_slope * w * v +
+              of.by_angle * (w_slope * v + w * v_slope);
+  slope[j + 1] -= 0.5 * by_angle_slope * v * v + of.by_angle * v * v_slope;
 }
 
 const effect_action inertia_variation_action = {.kind = EFFECT_TORQUE,
