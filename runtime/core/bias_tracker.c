@@ -6,7 +6,6 @@
 
 #include "extensions.h"
 #include "finger_memory.h"
-#include "kernel_choice.h"
 
 /* --- jumps ----------------------------------------------------------------------------------------------------------
  */
@@ -109,9 +108,10 @@ void remember_transitions(tendonfmu_finger* f, double time) {
 }
 
 void hold_bias(tendonfmu_finger* f, double time) {
-  clear_lanes(f->remembered.gain, f->joint_lanes);
-  if (!f->derived.settings.forgets_by_absorption) {
-    f->kernel->restart_rests(f, time);
+  const finger_state* s = &f->remembered;
+  clear_lanes(s->gain, f->joint_lanes);
+  for (size_t slot = 0; !f->derived.settings.forgets_by_absorption && slot < f->slots; ++slot) {
+    s->stuck_since[slot] = s->moving[slot] > 0.5 ? s->stuck_since[slot] : time;
   }
 }
 

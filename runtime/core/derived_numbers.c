@@ -130,6 +130,7 @@ static int derive_item(void* context, const model_item* item) {
     case ITEM_JOINT_FRICTION: pack_law(to->joint_law + j * LAW_NUMBERS, values, item->law); break;
     case ITEM_LOAD_FRICTION: pack_law(to->load_law + j * LAW_NUMBERS, values, item->law); break;
     case ITEM_STIFFNESS:
+      to->bidirectional[i] = item->bidirectional;
       to->stiffness[i] = values[0];
       to->inverse_stiffness[i] = bounded_inverse(values[0]);
       break;
@@ -196,17 +197,6 @@ static void derive_routing(tendonfmu_finger* f) {
   }
 }
 
-static void derive_flags(tendonfmu_finger* f) {
-  const uint32_t* word = f->shape.words + f->joints;
-  for (size_t i = 0; i < f->tendons; ++i) {
-    f->derived.bidirectional[i] = *word & 1 ? 1.0 : 0.0;
-    word += 1 + f->joints;
-    for (size_t j = 0; j < f->joints; ++j) {
-      word += 1 + (*word & ~MODEL_EDGE_HAS_ANGLES);
-    }
-  }
-}
-
 void recall_sample(tendonfmu_finger* f) {
   memcpy(f->next, f->state + (f->state_count - f->next_count), f->next_count * sizeof(double));
   if (f->derived.settings.watches_sensors) {
@@ -235,7 +225,6 @@ void derive_numbers(tendonfmu_finger* finger, int routing_changed) {
   if (options & MODEL_HAS_LINKS) {
     find_least_links(&finger->derived.links, finger->joints, finger->derived.least_link);
   }
-  derive_flags(finger);
   if (routing_changed) {
     derive_routing(finger);
     find_what_can_hold(finger);

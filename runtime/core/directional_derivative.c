@@ -34,7 +34,7 @@ typedef struct signal_derivative {
 static void pass_signals(const tendonfmu_finger* f, effect_signals* direction, int late) {
   direction->late = late;
   for (size_t r = 0; r < f->extensions.signals; ++r) {
-    const extension_row* row = signal_row(f, r);
+    const extension_row* row = f->extensions.signal + r;
     row->action->signal_pass(row, direction);
   }
 }
@@ -94,7 +94,7 @@ static void linearise_kinematics(linearisation* l, const signal_derivative* d) {
 /* what friction rows make of F and b */
 static dual slot_grip(const linearisation* l, size_t slot, dual velocity) {
   const finger_scratch* s = &l->finger->scratch;
-  if (!l->finger->extensions.friction) {
+  if (!l->finger->extensions.frictions) {
     return (dual){1.0, 0.0};
   }
   return (dual){s->grip[slot], s->grip_slope[slot] * velocity.slope};
@@ -278,7 +278,7 @@ static void linearise_limits(linearisation* l, const double* force) {
   const effect_sample sample = remembered_sample(f);
   const effect_direction direction = {.force = force};
   for (size_t r = 0; r < f->extensions.torques; ++r) {
-    extension_row row = *torque_row(f, r);
+    extension_row row = f->extensions.torque[r];
     const size_t slot = row.action->slot ? row.action->slot(&row, f->joints, f->tendon_lanes, 0) : 0;
     if (slot >= joint_row && remembers_at(f, slot)) {
       double whole = 1.0;
@@ -302,7 +302,7 @@ static void linearise_extensions(linearisation* l, const double* force) {
   const effect_sample sample = remembered_sample(f);
   const effect_direction direction = {.angle = angle, .velocity = velocity, .force = force};
   for (size_t r = 0; r < f->extensions.torques; ++r) {
-    const extension_row* row = torque_row(f, r);
+    const extension_row* row = f->extensions.torque + r;
     if (row->action->slope) {
       row->action->slope(row, &sample, &direction, slope);
     }

@@ -14,11 +14,11 @@ static const effect_type* effect_of(const tendonfmu_finger* f, uint32_t index) {
   return effect_by_id(f->shape.extensions[(size_t)index * MODEL_EXTENSION_WORDS]);
 }
 
-/* the rows of a kind from `begin` on; how many. Numbers and memory of all rows follow each other as in the description,
+/* the rows of a kind, from `to` on; how many. Numbers and memory of all rows follow each other as in the description,
  * the numbers behind all others. */
-static size_t note_kind(tendonfmu_finger* f, effect_kind kind, int order, size_t begin) {
+static size_t note_kind(tendonfmu_finger* f, effect_kind kind, int order, extension_row* to) {
   const double* numbers = f->parameters + f->shape.parameter_count;
-  size_t found = begin, memory = 0;
+  size_t found = 0, memory = 0;
   for (uint32_t i = 0; i < f->shape.extension_count; ++i) {
     numbers -= effect_of(f, i)->parameter_count;
   }
@@ -27,17 +27,17 @@ static size_t note_kind(tendonfmu_finger* f, effect_kind kind, int order, size_t
     const effect_place place = model_extension_place(&f->shape, i);
     const size_t own = model_extension_memory(effect, &f->shape, place);
     if (effect->action->kind == kind && effect->action->order == order) {
-      f->extensions.row[found++] = (extension_row){.action = effect->action,
-                                                   .place = place,
-                                                   .parameters = numbers,
-                                                   .before = own ? f->remembered.extension + memory : NULL,
-                                                   .now = own ? f->scratch.extension + memory : NULL,
-                                                   .memory_count = own};
+      to[found++] = (extension_row){.action = effect->action,
+                                    .place = place,
+                                    .parameters = numbers,
+                                    .before = own ? f->remembered.extension + memory : NULL,
+                                    .now = own ? f->scratch.extension + memory : NULL,
+                                    .memory_count = own};
     }
     numbers += effect->parameter_count;
     memory += own;
   }
-  return found - begin;
+  return found;
 }
 
 static void find_axis_cosines(tendonfmu_finger* f) {
@@ -68,19 +68,21 @@ void find_extensions(tendonfmu_finger* f) {
   if (!f->shape.extension_count) {
     return;
   }
-  size_t signals = 0;
+  extension_rows* rows = &f->extensions;
+  rows->signals = 0;
   for (int order = 0; order < SIGNAL_ORDERS; ++order) {
-    signals += note_kind(f, EFFECT_SIGNAL, order, signals);
+    rows->signals += note_kind(f, EFFECT_SIGNAL, order, rows->signal + rows->signals);
   }
-  f->extensions.signals = signals;
-  f->extensions.friction = note_kind(f, EFFECT_FRICTION, 0, signals);
-  f->extensions.torques = note_kind(f, EFFECT_TORQUE, 0, signals + f->extensions.friction);
-  const size_t others = signals + f->extensions.friction + f->extensions.torques;
-  f->extensions.memory = note_kind(f, EFFECT_MEMORY, 0, others);
+  rows->friction = rows->signal + rows->signals;
+  rows->frictions = note_kind(f, EFFECT_FRICTION, 0, rows->friction);
+  rows->torque = rows->friction + rows->frictions;
+  rows->torques = note_kind(f, EFFECT_TORQUE, 0, rows->torque);
+  rows->memory = rows->torque + rows->torques;
+  rows->memories = note_kind(f, EFFECT_MEMORY, 0, rows->memory);
   find_axis_cosines(f);
   find_memory(f);
   clear_grips(f);
-  f->extensions.gripped = f->extensions.friction > 0 || f->memory.elements > 0;
+  rows->gripped = rows->frictions > 0 || f->memory.elements > 0;
 }
 
 /* --- what the others remember ---------------------------------------------------------------------------------------
@@ -101,7 +103,7 @@ static effect_sample sample_of_finger(const tendonfmu_finger* f) {
 
 void advance_extensions(tendonfmu_finger* f, double time, double step) {
   const finger_scratch* s = &f->scratch;
-  const size_t others = f->extensions.signals + f->extensions.friction + f->extensions.torques;
+  const size_t count = f->extensions.frictions + f->extensions.torques;
   effect_sample* sample = &f->scratch.sample;
   *sample = sample_of_finger(f);
   sample->first = is_first(f);
@@ -111,8 +113,7 @@ void advance_extensions(tendonfmu_finger* f, double time, double step) {
   sample->velocity = s->velocity + f->joints * f->tendon_lanes;
   sample->tendon_velocity = s->velocity;
   sample->force = s->force;
-  for (size_t r = f->extensions.signals; r < others; ++r) {
-    const extension_row* row = f->extensions.row + r;
+  for (const extension_row* row = f->extensions.friction; row < f->extensions.friction + count; ++row) {
     if (row->action->advance) {
       row->action->advance(row, sample);
     }
@@ -149,8 +150,7 @@ void shape_signals(tendonfmu_finger* f, double time, int late) {
                             .velocity = s->velocity + f->joints * f->tendon_lanes,
                             .inverse_stiffness = f->derived.inverse_stiffness};
   for (size_t n = 0; n < f->extensions.signals; ++n) {
-    const extension_row* row = signal_row(f, n);
-    row->action->signal(row, &signals);
+    f->extensions.signal[n].action->signal(&f->extensions.signal[n], &signals);
   }
 }
 
@@ -191,12 +191,12 @@ static void grip_row(tendonfmu_finger* f, const extension_row* row) {
 }
 
 void find_grips(tendonfmu_finger* f) {
-  if (!f->extensions.friction) {
+  if (!f->extensions.frictions) {
     return;
   }
   clear_grips(f);
-  for (size_t r = 0; r < f->extensions.friction; ++r) {
-    grip_row(f, friction_row(f, r));
+  for (size_t r = 0; r < f->extensions.frictions; ++r) {
+    grip_row(f, f->extensions.friction + r);
   }
 }
 
@@ -218,7 +218,7 @@ void grip_jumps(tendonfmu_finger* f) {
 
 void add_extension_torques(tendonfmu_finger* f) {
   for (size_t r = 0; r < f->extensions.torques; ++r) {
-    const extension_row* row = torque_row(f, r);
+    const extension_row* row = f->extensions.torque + r;
     row->action->torque(row, &f->scratch.sample, f->scratch.friction);
   }
 }

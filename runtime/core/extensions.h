@@ -7,17 +7,6 @@
 /* Fills the table of rows and the cosines between the axes; whenever numbers were derived anew. */
 void find_extensions(tendonfmu_finger* finger);
 
-/* The n-th row of a part of the table. */
-static inline const extension_row* signal_row(const tendonfmu_finger* finger, size_t n) {
-  return finger->extensions.row + n;
-}
-static inline const extension_row* friction_row(const tendonfmu_finger* finger, size_t n) {
-  return finger->extensions.row + finger->extensions.signals + n;
-}
-static inline const extension_row* torque_row(const tendonfmu_finger* finger, size_t n) {
-  return finger->extensions.row + finger->extensions.signals + finger->extensions.friction + n;
-}
-
 /* Side of the law of a slot that never sticks: 1 where it is the one for v < 0. */
 static inline int sliding_side(double velocity, double threshold, double side) {
   return velocity > threshold ? 0 : velocity < -threshold ? 1 : side < 0.0;

@@ -202,22 +202,16 @@ tendonfmu_status tendonfmu_set_kinematics_source(tendonfmu_finger* finger, int s
 }
 
 static tendonfmu_status take(tendonfmu_finger* finger, double time, const tendonfmu_inputs* inputs) {
-  if (samples_take_inputs(finger, time, inputs, error_line(finger))) {
-    return TENDONFMU_BAD_SAMPLE;
+  const int taken = samples_take_inputs(finger, time, inputs, error_line(finger));
+  if (taken <= 0) {
+    return taken ? TENDONFMU_BAD_SAMPLE : TENDONFMU_OK;
   }
-  if (tendonfmu_is_initialised(finger) && time == finger->remembered.scalar[STATE_TIME]) {
-    return TENDONFMU_OK; /* the sample already taken */
+  if (take_sample(finger, time)) {
+    recall_sample(finger);
+    return fail(finger, TENDONFMU_BAD_SAMPLE,
+                "the sample at time %g s overflows: expected forces and velocities whose torques are finite", time);
   }
-  switch (take_sample(finger, time)) {
-    case SAMPLE_OUT_OF_RANGE: samples_name_bad_input(finger, time, inputs, error_line(finger)); break;
-    case SAMPLE_OVERFLOWS:
-      message_write(error_line(finger),
-                    "the sample at time %g s overflows: expected forces and velocities whose torques are finite", time);
-      recall_sample(finger);
-      break;
-    default: return TENDONFMU_OK;
-  }
-  return TENDONFMU_BAD_SAMPLE;
+  return TENDONFMU_OK;
 }
 
 static tendonfmu_status already_taken(const tendonfmu_finger* finger) {

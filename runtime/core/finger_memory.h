@@ -42,11 +42,11 @@ typedef struct finger_settings {
   double position_resolution;                           /* m */
 } finger_settings;
 
-/* The rows by what they act on, each part in the description's order: signals, friction, torques, memory. */
+/* The rows by what they act on, those of each kind in the description's order; friction and torques side by side. */
 typedef struct extension_rows {
-  extension_row* row;
-  size_t signals, friction, torques, memory; /* how many of each */
-  int gripped;                               /* friction or memory rows: F at a slot is not what fig. 5 gives alone */
+  extension_row *signal, *friction, *torque, *memory;
+  size_t signals, frictions, torques, memories; /* how many of each */
+  int gripped;                                  /* friction or memory rows: F at a slot is not what fig. 5 gives alone */
 } extension_rows;
 
 /* One of the elements side by side, by slot [n × M + N]; the edge and the pulley of a slot share its numbers. */

@@ -18,10 +18,6 @@ const effect_action cord_stretch_action = {.kind = EFFECT_MEMORY};
 /* numbers of a row of presliding, as in effects.json */
 enum { DISPLACEMENT, STIFFNESS, RELAXATION_TIME, SHARE };
 
-static const extension_row* memory_row(const tendonfmu_finger* f, size_t n) {
-  return f->extensions.row + f->extensions.signals + f->extensions.friction + f->extensions.torques + n;
-}
-
 /* how specific a row of presliding is at a slot; 0: it does not act there */
 static int rank_at(const tendonfmu_finger* f, effect_place place, size_t slot) {
   const size_t lanes = f->tendon_lanes, joint_row = f->joints * lanes;
@@ -71,8 +67,8 @@ static void find_elements(tendonfmu_finger* f, size_t slot) {
   size_t found = 0;
   int rank = 0;
   double sum = 0.0;
-  for (size_t r = 0; r < f->extensions.memory; ++r) {
-    const extension_row* row = memory_row(f, r);
+  for (size_t r = 0; r < f->extensions.memories; ++r) {
+    const extension_row* row = f->extensions.memory + r;
     const int here = turns && row->action == &presliding_action ? rank_at(f, row->place, slot) : 0;
     if (here > rank) {
       rank = here;
@@ -96,8 +92,8 @@ static void find_elements(tendonfmu_finger* f, size_t slot) {
 
 /* 1/k_c, m/N; 0: rigid */
 static double cord_compliance(const tendonfmu_finger* f) {
-  for (size_t r = 0; r < f->extensions.memory; ++r) {
-    const extension_row* row = memory_row(f, r);
+  for (size_t r = 0; r < f->extensions.memories; ++r) {
+    const extension_row* row = f->extensions.memory + r;
     if (row->action == &cord_stretch_action) {
       return 1.0 / row->parameters[0];
     }

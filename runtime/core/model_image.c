@@ -48,10 +48,9 @@ static void walk_joints(walk* w) {
 
 static const uint32_t* walk_tendon(walk* w, uint32_t tendon, const uint32_t* word) {
   const uint32_t n = w->shape->joints;
-  emit(w, (model_item){.kind = ITEM_STIFFNESS, .tendon = tendon}, 1);
+  emit(w, (model_item){.kind = ITEM_STIFFNESS, .tendon = tendon, .bidirectional = *word++ & 1}, 1);
   emit(w, (model_item){.kind = ITEM_MOMENT_ARMS, .tendon = tendon}, n);
   emit(w, (model_item){.kind = ITEM_TENDON_ZERO, .tendon = tendon}, w->shape->options & MODEL_HAS_TENDON_ZERO ? 1 : 0);
-  ++word; /* flags */
   for (uint32_t j = 0; j < n; ++j) {
     emit_law(w, (model_item){.kind = ITEM_PULLEY_FRICTION, .tendon = tendon, .joint = j}, *word++);
   }
@@ -176,12 +175,6 @@ static uint64_t values_offset(const model_shape* shape) {
   return (unpadded_size(shape) + 7u) & ~(uint64_t)7u;
 }
 
-/* −1 where one option needs another that is missing */
-static int check_options(const model_shape* shape) {
-  const uint32_t both = MODEL_DETECTS_BY_BANDS | MODEL_WATCHES_MOTORS;
-  return (shape->options & both) == MODEL_WATCHES_MOTORS ? -1 : 0;
-}
-
 static int read_counts(const void* image, size_t image_size, model_shape* shape, message_line message) {
   const unsigned char* bytes = image;
   if (!image || image_size < MODEL_HEADER_BYTES || memcmp(bytes, magic, sizeof magic) != 0) {
@@ -217,7 +210,7 @@ static int read_counts(const void* image, size_t image_size, model_shape* shape,
   if (shape->options & ~(uint32_t)MODEL_OPTION_BITS) {
     return refuse_value(message, "model image: option bits", shape->options, "a sum of known ones");
   }
-  if (check_options(shape)) {
+  if ((shape->options & (MODEL_DETECTS_BY_BANDS | MODEL_WATCHES_MOTORS)) == MODEL_WATCHES_MOTORS) {
     return refuse_value(message, "model image: option bits", shape->options, "ones that go together");
   }
   if (values_offset(shape) + 8u * (uint64_t)shape->parameter_count != image_size) {

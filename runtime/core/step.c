@@ -9,30 +9,6 @@
 #include "kernel_choice.h"
 #include "sensor_fault.h"
 
-/* --- inputs ---------------------------------------------------------------------------------------------------------
- */
-
-/* NaN is out of range */
-static int row_in_range(const double* row, size_t lanes) {
-  int inside = 1;
-  for (size_t i = 0; i < lanes; i += 4) {
-    for (size_t lane = i; lane < i + 4; ++lane) {
-      inside &= fabs(row[lane]) <= LARGEST_INPUT;
-    }
-  }
-  return inside;
-}
-
-static int inputs_in_range(const tendonfmu_finger* f) {
-  const finger_scratch* s = &f->scratch;
-  const int source = source_of(f);
-  const double* velocity = s->velocity + f->joints * f->tendon_lanes;
-  return row_in_range(s->force, f->tendon_lanes) &&
-         (!uses_positions(f) || row_in_range(s->position, f->tendon_lanes)) &&
-         (source == TENDONFMU_TENDON_POSITIONS || row_in_range(s->angle, f->joint_lanes)) &&
-         (source != TENDONFMU_JOINT_VELOCITIES || row_in_range(velocity, f->joint_lanes));
-}
-
 /* --- kinematics -----------------------------------------------------------------------------------------------------
  */
 
@@ -244,14 +220,11 @@ static int find_torques(tendonfmu_finger* f) {
   return transitions;
 }
 
-sample_result take_sample(tendonfmu_finger* f, double time) {
+int take_sample(tendonfmu_finger* f, double time) {
   const finger_state* s = &f->remembered;
   const int first = is_first(f);
   const double step = time - s->scalar[STATE_TIME];
 
-  if (!inputs_in_range(f)) {
-    return SAMPLE_OUT_OF_RANGE;
-  }
   for (size_t i = 0; f->derived.settings.has_tendon_zero && uses_positions(f) && i < f->tendons; ++i) {
     f->scratch.position[i] -= f->derived.tendon_zero[i];
   }
@@ -274,7 +247,7 @@ sample_result take_sample(tendonfmu_finger* f, double time) {
   const int transitions = find_torques(f);
   const double mean_force = mean_tendon_force(f);
   if (!all_finite(f)) {
-    return SAMPLE_OVERFLOWS;
+    return -1;
   }
 
   remember_sample(f, time, velocity_gain, transitions);
@@ -293,5 +266,5 @@ sample_result take_sample(tendonfmu_finger* f, double time) {
     s->compensated[j] = s->torque[j] - s->friction[j];
   }
   estimate_variance(f, mean_force);
-  return SAMPLE_TAKEN;
+  return 0;
 }

@@ -68,7 +68,7 @@ static int joint_reads(const tendonfmu_finger* f, size_t j, size_t i) {
   const int has_load_friction = (f->shape.words[j] >> 3 & 3) != LAW_ABSENT;
   int reads = has_load_friction || f->derived.moment_arm[j * f->tendon_lanes + i] != 0.0;
   for (size_t r = 0; r < f->shape.extension_count; ++r) {
-    const effect_place place = f->extensions.row[r].place;
+    const effect_place place = f->extensions.signal[r].place;
     reads |= place.joint == j && place.tendon == i;
   }
   return reads;

@@ -75,7 +75,7 @@ HOT_INLINE const slot_view* view_at(tendonfmu_finger* f, const motion* m, double
 
 /* what the friction rows make of a friction value */
 HOT_INLINE quad gripped(const tendonfmu_finger* f, size_t slot, quad friction) {
-  if (!f->extensions.friction) {
+  if (!f->extensions.frictions) {
     return friction;
   }
   return quad_load(f->scratch.grip + slot) * friction;
@@ -313,13 +313,6 @@ static void remember_slots(tendonfmu_finger* f, double time) {
   }
 }
 
-static void restart_rests(tendonfmu_finger* f, double time) {
-  for (size_t slot = 0; slot < f->slots; slot += QUAD_LANES) {
-    const quad since = quad_load(f->remembered.stuck_since + slot);
-    quad_store(f->remembered.stuck_since + slot, quad_select(moved_before(f, slot), since, quad_set(time)));
-  }
-}
-
 /* --- sums over the tendons ---------------------------------------------------------------------------------------- */
 
 /* Σ over the tendons of row[i]·x[i], still to be summed across the lanes */
@@ -371,5 +364,5 @@ static void one_minus_exponentials(const double* x, double* values, size_t count
 #define STEP_KERNEL(name)                                                                                \
   {                                                                                                      \
     name, one_minus_exponentials, multiply, tendon_velocities, watch_tendons, follow_bands, weigh_bands, \
-        find_friction, remember_slots, restart_rests                                                     \
+        find_friction, remember_slots                                                                    \
   }
