@@ -17,15 +17,11 @@ static int moves_now(const tendonfmu_finger* f, size_t slot) {
 static transition transition_at(const tendonfmu_finger* f, size_t slot) {
   const finger_state* s = &f->remembered;
   const int now = moves_now(f, slot), before = s->moving[slot] > 0.5;
-  const double since = s->stuck_since[slot];
-  const double forgotten = f->derived.settings.forgets_by_absorption
-                               ? s->scalar[STATE_ABSORBED] - since
-                               : f->derived.settings.forget_rate * (s->last_stuck[slot] - since);
   return (transition){.stops = before && !now,
                       .starts = now && !before,
                       .side_before = s->side[slot],
                       .side_now = copysign(1.0, f->scratch.velocity[slot]),
-                      .exponent = forgotten,
+                      .exponent = rest_exponent(f, slot, s->scalar[STATE_ABSORBED]),
                       .threshold = threshold_of(f, slot)};
 }
 
@@ -98,7 +94,7 @@ void find_bias_steps(tendonfmu_finger* f) {
 
 void remember_transitions(tendonfmu_finger* f, double time) {
   const finger_state* s = &f->remembered;
-  const double clock = f->derived.settings.forgets_by_absorption ? s->scalar[STATE_ABSORBED] : time;
+  const double clock = has_option(f, MODEL_FORGETS_BY_ABSORPTION) ? s->scalar[STATE_ABSORBED] : time;
   for (size_t slot = 0; slot < f->slots; ++slot) {
     const int now = moves_now(f, slot), before = s->moving[slot] > 0.5;
     s->event[slot] = now && !before ? s->side[slot] - 2.0 : before && !now ? 1.0 : 0.0;
@@ -110,7 +106,7 @@ void remember_transitions(tendonfmu_finger* f, double time) {
 void hold_bias(tendonfmu_finger* f, double time) {
   const finger_state* s = &f->remembered;
   clear_lanes(s->gain, f->joint_lanes);
-  for (size_t slot = 0; !f->derived.settings.forgets_by_absorption && slot < f->slots; ++slot) {
+  for (size_t slot = 0; !has_option(f, MODEL_FORGETS_BY_ABSORPTION) && slot < f->slots; ++slot) {
     s->stuck_since[slot] = s->moving[slot] > 0.5 ? s->stuck_since[slot] : time;
   }
 }
@@ -165,7 +161,7 @@ static double kalman_gain(double predicted, double noise) {
 
 /* K with the variance of friction whose state nobody knows beside P⁻: it is distributed evenly */
 static double gain_of_joint(const tendonfmu_finger* f, size_t j, double predicted, double noise, double gain) {
-  if (!f->derived.settings.has_bands || f->guide.guides) {
+  if (!has_option(f, MODEL_DETECTS_BY_BANDS) || f->guide.guides) {
     return gain;
   }
   const double unknown = f->scratch.unknown[j];
@@ -190,7 +186,7 @@ void track_bias(tendonfmu_finger* f, double step, double noise) {
     s->variance[j] = (1.0 - gain) * predicted;
     left = j ? left : 1.0 - gain;
   }
-  if (f->derived.settings.forgets_by_absorption) {
+  if (has_option(f, MODEL_FORGETS_BY_ABSORPTION)) {
     count_absorbed(f, left);
   }
 }

@@ -188,7 +188,7 @@ static void derive_routing(tendonfmu_finger* f) {
       matrix[i * n + j] = f->derived.moment_arm[j * lanes + i];
     }
   }
-  for (size_t at = 0; f->derived.settings.has_bands && at < n * lanes; ++at) {
+  for (size_t at = 0; has_option(f, MODEL_DETECTS_BY_BANDS) && at < n * lanes; ++at) {
     f->derived.load_arm[at] = f->derived.moment_arm[at] * f->derived.stiffness[at % lanes];
   }
   pseudo_inverse(m, n, matrix, matrix);
@@ -199,7 +199,7 @@ static void derive_routing(tendonfmu_finger* f) {
 
 void recall_sample(tendonfmu_finger* f) {
   memcpy(f->next, f->state + (f->state_count - f->next_count), f->next_count * sizeof(double));
-  if (f->derived.settings.watches_sensors) {
+  if (has_option(f, MODEL_HAS_SENSOR_FAULT)) {
     use_rows(f, f->remembered.sensor.fault);
   }
   for (size_t slot = 0; slot < f->slots; ++slot) {
@@ -210,19 +210,12 @@ void recall_sample(tendonfmu_finger* f) {
 void derive_numbers(tendonfmu_finger* finger, int routing_changed) {
   /* record 0 and 1 stay zero: edges without friction */
   derivation d = {.finger = finger, .values = finger->parameters, .next_record = 2};
-  const uint32_t options = finger->shape.options;
-  finger->derived.settings = (finger_settings){.initial_variance = -1.0,
-                                               .noise_time = -1.0,
-                                               .forgets_by_absorption = (options & MODEL_FORGETS_BY_ABSORPTION) != 0,
-                                               .has_initial_torque = (options & MODEL_HAS_INITIAL_TORQUE) != 0,
-                                               .has_tendon_zero = (options & MODEL_HAS_TENDON_ZERO) != 0,
-                                               .has_bands = (options & MODEL_DETECTS_BY_BANDS) != 0,
-                                               .watches_motors = (options & MODEL_WATCHES_MOTORS) != 0,
-                                               .watches_sensors = (options & MODEL_HAS_SENSOR_FAULT) != 0};
+  finger->derived.settings = (finger_settings){
+      .initial_variance = -1.0, .noise_time = -1.0, .has_initial_torque = has_option(finger, MODEL_HAS_INITIAL_TORQUE)};
   clear_grids(finger);
   model_visit(&finger->shape, derive_item, &d);
   finger->derived.settings.cutoff_rate *= two_pi;
-  if (options & MODEL_HAS_LINKS) {
+  if (has_option(finger, MODEL_HAS_LINKS)) {
     find_least_links(&finger->derived.links, finger->joints, finger->derived.least_link);
   }
   if (routing_changed) {

@@ -149,7 +149,7 @@ static dual bias_at(const linearisation* l, const effect_laws* laws, size_t slot
                         .starts = s->event[slot] < 0.0,
                         .side_before = side_before(l->finger, slot),
                         .side_now = s->side[slot],
-                        .exponent = rest_exponent(l->finger, slot),
+                        .exponent = rest_exponent(l->finger, slot, s->scalar[STATE_ABSORBED_BEFORE]),
                         .threshold = threshold_of(l->finger, slot)};
   return product(slot_grip(l, slot, velocity), jump_of(&t, laws));
 }
@@ -319,7 +319,7 @@ static void linearise_extensions(linearisation* l, const double* force) {
 static void linearise_mean(linearisation* l, const double* direction) {
   const tendonfmu_finger* f = l->finger;
   double sound[MODEL_MAX_TENDONS];
-  const int watches = f->derived.settings.watches_sensors;
+  const int watches = has_option(f, MODEL_HAS_SENSOR_FAULT);
   if (watches) {
     weigh_forces(f, f->remembered.sensor.fault, sound);
   }
@@ -364,7 +364,7 @@ static void write_joint(const linearisation* l, size_t j, const tendonfmu_output
   const double torque = l->torque_slope[j], friction = l->friction[j].slope;
   double bias = l->bias_step[j].slope;
   double total = friction + bias;
-  const int begins_anew = f->derived.settings.watches_sensors && f->remembered.watch[j] == JOINT_BEGINS_ANEW;
+  const int begins_anew = has_option(f, MODEL_HAS_SENSOR_FAULT) && f->remembered.watch[j] == JOINT_BEGINS_ANEW;
   if (begins_anew) {
     bias = torque - friction;
     total = torque;

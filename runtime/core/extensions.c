@@ -41,7 +41,7 @@ static size_t note_kind(tendonfmu_finger* f, effect_kind kind, int order, extens
 }
 
 static void find_axis_cosines(tendonfmu_finger* f) {
-  const int linked = (f->shape.options & MODEL_HAS_LINKS) != 0;
+  const int linked = has_option(f, MODEL_HAS_LINKS);
   const double* axis = f->derived.links.axis; /* unit vectors */
   for (size_t j = 0; j < f->joints; ++j) {
     for (size_t k = 0; k < f->joints; ++k) {

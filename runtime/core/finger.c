@@ -159,15 +159,15 @@ size_t tendonfmu_tendon_count(const tendonfmu_finger* finger) {
 }
 
 int tendonfmu_has_links(const tendonfmu_finger* finger) {
-  return finger && (finger->shape.options & MODEL_HAS_LINKS) != 0;
+  return finger && has_option(finger, MODEL_HAS_LINKS);
 }
 
 int tendonfmu_watches_motors(const tendonfmu_finger* finger) {
-  return finger && (finger->shape.options & MODEL_WATCHES_MOTORS) != 0;
+  return finger && has_option(finger, MODEL_WATCHES_MOTORS);
 }
 
 int tendonfmu_watches_sensors(const tendonfmu_finger* finger) {
-  return finger && (finger->shape.options & MODEL_HAS_SENSOR_FAULT) != 0;
+  return finger && has_option(finger, MODEL_HAS_SENSOR_FAULT);
 }
 
 /* --- samples ------------------------------------------------------------------------------------------------------ */
@@ -297,7 +297,7 @@ tendonfmu_status tendonfmu_run_guided(tendonfmu_finger* finger, size_t samples, 
   if (!finger || !inputs || !guide || !outputs || (!time && samples)) {
     return missing(finger);
   }
-  if (finger->derived.settings.watches_sensors) {
+  if (has_option(finger, MODEL_HAS_SENSOR_FAULT)) {
     return fail(finger, TENDONFMU_BAD_ARGUMENT, "a guided run with sensor_fault: expected a finger without");
   }
   if (samples && tendonfmu_is_initialised(finger)) {

@@ -34,9 +34,7 @@ typedef struct finger_settings {
   double drift_variance, noise_std, noise_std_per_force, forget_rate;
   double initial_variance; /* < 0: from the noise at the first sample */
   double noise_time;       /* < 0: noise per sample */
-  int has_initial_torque, has_tendon_zero;
-  int forgets_by_absorption;
-  int has_bands, watches_motors, watches_sensors;
+  int has_initial_torque;
   double fault_hold_time, longest_stand, recovery_time; /* s */
   double force_resolution, jump_margin, spring_margin;  /* N */
   double position_resolution;                           /* m */
@@ -46,7 +44,7 @@ typedef struct finger_settings {
 typedef struct extension_rows {
   extension_row *signal, *friction, *torque, *memory;
   size_t signals, frictions, torques, memories; /* how many of each */
-  int gripped;                                  /* friction or memory rows: F at a slot is not what fig. 5 gives alone */
+  int gripped; /* friction or memory rows: F at a slot is not what fig. 5 gives alone */
 } extension_rows;
 
 /* One of the elements side by side, by slot [n × M + N]; the edge and the pulley of a slot share its numbers. */
@@ -256,16 +254,16 @@ typedef struct finger_scratch {
   double* young;                     /* [N] of a mean that began with this joint's, instead of those in shares */
   band_shares* shares;               /* of the last step */
   /* with sensor_fault only */
-  sensor_memory sensor;     /* as in the state, after this sample */
-  double* inverse_routing;  /* [n × M] R⁺ of the rows in use */
-  double* leverage;         /* [M] h/(1 − h) of the rows in use; 0 of the others */
-  double* determined;       /* [M] 1: the others determine the angles */
-  double* row_in_use;       /* [M] 1 or 0; 0 where the angles are measured */
-  double* watch;            /* [N] as in the state, after this sample */
-  double* angle_shift;      /* [N] rad, by which the angles of the sample before change with the rows in use */
-  int angles_determined;    /* no row in use belongs to a failing sensor */
-  int unwell;               /* as in the state, after this sample */
-  double* extension;        /* the memory of the extensions after this sample */
+  sensor_memory sensor;      /* as in the state, after this sample */
+  double* inverse_routing;   /* [n × M] R⁺ of the rows in use */
+  double* leverage;          /* [M] h/(1 − h) of the rows in use; 0 of the others */
+  double* determined;        /* [M] 1: the others determine the angles */
+  double* row_in_use;        /* [M] 1 or 0; 0 where the angles are measured */
+  double* watch;             /* [N] as in the state, after this sample */
+  double* angle_shift;       /* [N] rad, by which the angles of the sample before change with the rows in use */
+  int angles_determined;     /* no row in use belongs to a failing sensor */
+  int unwell;                /* as in the state, after this sample */
+  double* extension;         /* the memory of the extensions after this sample */
   double *grip, *grip_slope; /* [n × M + N] what friction rows make of F and b, and ∂/∂v; with extensions only */
   double* bias_grip;         /* [n × M + N] the same of b: 0 where nothing sticks */
   /* with a memory only */
@@ -312,6 +310,11 @@ static inline double sum_of_lanes(const double of[4]) {
   return (of[0] + of[2]) + (of[1] + of[3]);
 }
 
+/* Whether the description has any of these parts (MODEL_HAS_LINKS, …). */
+static inline int has_option(const tendonfmu_finger* finger, uint32_t options) {
+  return (finger->shape.options & options) != 0;
+}
+
 /* What a joint's bands remember. */
 static inline band_memory* bands_of(const tendonfmu_finger* finger, size_t joint) {
   return (band_memory*)(void*)finger->remembered.bands + joint;
@@ -324,7 +327,7 @@ static inline int is_first(const tendonfmu_finger* finger) {
 /* Angle of a joint at the sample before, by the rows that are in use now. */
 static inline double angle_before_step(const tendonfmu_finger* finger, size_t joint) {
   const double angle = finger->remembered.angle[joint];
-  return finger->derived.settings.watches_sensors ? angle + finger->scratch.angle_shift[joint] : angle;
+  return has_option(finger, MODEL_HAS_SENSOR_FAULT) ? angle + finger->scratch.angle_shift[joint] : angle;
 }
 
 /* Rows of lanes: four at once, for which no library is called. */
@@ -346,13 +349,13 @@ static inline int source_of(const tendonfmu_finger* finger) {
 }
 
 static inline int uses_positions(const tendonfmu_finger* finger) {
-  const finger_settings* settings = &finger->derived.settings;
-  return source_of(finger) == TENDONFMU_TENDON_POSITIONS || settings->watches_motors || settings->watches_sensors;
+  return source_of(finger) == TENDONFMU_TENDON_POSITIONS ||
+         has_option(finger, MODEL_WATCHES_MOTORS | MODEL_HAS_SENSOR_FAULT);
 }
 
 /* R⁺ as the kinematics use it */
 static inline const double* inverse_in_use(const tendonfmu_finger* finger) {
-  return finger->derived.settings.watches_sensors ? finger->scratch.inverse_routing : finger->derived.inverse_routing;
+  return has_option(finger, MODEL_HAS_SENSOR_FAULT) ? finger->scratch.inverse_routing : finger->derived.inverse_routing;
 }
 
 /* v_min of a slot: m/s, rad/s */
@@ -367,13 +370,13 @@ static inline double side_before(const tendonfmu_finger* finger, size_t slot) {
   return event < 0.0 ? event + 2.0 : finger->remembered.side[slot];
 }
 
-/* Exponent of forgetting of a slot at the last sample: exp(−this) of what it brought along when it came to rest counted
- * when it began to move. */
-static inline double rest_exponent(const tendonfmu_finger* finger, size_t slot) {
+/* Exponent of forgetting of a slot: exp(−this) of what it brought along when it came to rest counts when it begins to
+ * move. absorbed: Λ until then. */
+static inline double rest_exponent(const tendonfmu_finger* finger, size_t slot, double absorbed) {
   const finger_state* s = &finger->remembered;
   const double since = s->stuck_since[slot];
-  return finger->derived.settings.forgets_by_absorption
-             ? s->scalar[STATE_ABSORBED_BEFORE] - since
+  return has_option(finger, MODEL_FORGETS_BY_ABSORPTION)
+             ? absorbed - since
              : finger->derived.settings.forget_rate * (s->last_stuck[slot] - since);
 }
 

@@ -116,7 +116,7 @@ static void give_deviations(double* to, const double* variance, size_t count, si
 static void give_terms(double* to, const tendonfmu_finger* f, size_t row) {
   for (size_t j = 0; to && j < f->joints; ++j) {
     _Alignas(32) double terms[BAND_TERMS * BANDS] = {0.0};
-    if (f->derived.settings.has_bands) {
+    if (has_option(f, MODEL_DETECTS_BY_BANDS)) {
       size_t band;
       f->kernel->weigh_bands(bands_of(f, j), f->derived.band_square + j * BANDS * BAND_NUMBERS, terms, &band);
     }

@@ -68,7 +68,7 @@ static void measured_torques(tendonfmu_finger* f) {
 
 /* mean |f0| over the tendons */
 static double mean_tendon_force(const tendonfmu_finger* f) {
-  if (f->derived.settings.watches_sensors && f->scratch.unwell) {
+  if (has_option(f, MODEL_HAS_SENSOR_FAULT) && f->scratch.unwell) {
     return mean_sound_force(f);
   }
   double sums[4] = {0.0};
@@ -94,12 +94,12 @@ static int all_finite(const tendonfmu_finger* f) {
   double probe = extension_probe(f);
   for (size_t j = 0; j < f->joints; ++j) {
     double sum = fabs(s->torque[j]) + fabs(s->friction[j]) + (fabs(s->bias_step[j]) + fabs(f->remembered.bias[j]));
-    if (f->derived.settings.has_bands) {
+    if (has_option(f, MODEL_DETECTS_BY_BANDS)) {
       sum += fabs(s->motor_load[j]) + s->limit[j] + fabs(f->remembered.jumped[j]);
     }
     probe += 0.0 * (1e160 * sum) + (0.0 * s->angle[j] + 0.0 * velocity[j]); /* infinite above 1.8e148 */
   }
-  for (size_t i = 0; f->derived.settings.watches_sensors && i < f->tendons; ++i) {
+  for (size_t i = 0; has_option(f, MODEL_HAS_SENSOR_FAULT) && i < f->tendons; ++i) {
     probe += 0.0 * (1e30 * s->sensor.joint_side[i]); /* nor the force of a spring there */
   }
   return probe == 0.0;
@@ -138,7 +138,7 @@ static void begin_tracking(tendonfmu_finger* f, double time, double mean_force) 
   for (size_t slot = 0; slot < f->slots; ++slot) {
     s->event[slot] = 0.0;
     s->last_stuck[slot] = time;
-    s->stuck_since[slot] = f->derived.settings.forgets_by_absorption ? 0.0 : time;
+    s->stuck_since[slot] = has_option(f, MODEL_FORGETS_BY_ABSORPTION) ? 0.0 : time;
   }
   clear_lanes(s->joint_contact, f->joint_lanes);
   begin_detection(f, time);
@@ -151,7 +151,7 @@ static void jump_bias(tendonfmu_finger* f) {
   const finger_state* s = &f->remembered;
   for (size_t j = 0; j < f->joint_lanes; ++j) {
     s->bias[j] += f->scratch.bias_step[j];
-    if (f->derived.settings.has_bands) {
+    if (has_option(f, MODEL_DETECTS_BY_BANDS)) {
       s->jumped[j] += f->scratch.bias_step[j];
     }
   }
@@ -181,7 +181,7 @@ static void track_guided(tendonfmu_finger* f, double step, double mean_force) {
 
 /* steps 4 to 6 (docs/reference/semantics/README.md#order-of-the-steps) for every later sample */
 static void track_sample(tendonfmu_finger* f, double time, double step, double mean_force) {
-  const int unwell = f->derived.settings.watches_sensors && f->scratch.unwell;
+  const int unwell = has_option(f, MODEL_HAS_SENSOR_FAULT) && f->scratch.unwell;
   jump_bias(f);
   if (unwell) {
     begin_bias_anew(f);
@@ -225,16 +225,16 @@ int take_sample(tendonfmu_finger* f, double time) {
   const int first = is_first(f);
   const double step = time - s->scalar[STATE_TIME];
 
-  for (size_t i = 0; f->derived.settings.has_tendon_zero && uses_positions(f) && i < f->tendons; ++i) {
+  for (size_t i = 0; has_option(f, MODEL_HAS_TENDON_ZERO) && uses_positions(f) && i < f->tendons; ++i) {
     f->scratch.position[i] -= f->derived.tendon_zero[i];
   }
-  if (f->derived.settings.watches_motors) { /* x: the load that the motors drive, as if the joints stood */
+  if (has_option(f, MODEL_WATCHES_MOTORS)) { /* x: the load that the motors drive, as if the joints stood */
     f->kernel->multiply(f, f->derived.load_arm, f->scratch.position, f->scratch.motor_load);
   }
   if (f->extensions.signals) {
     shape_signals(f, time, 0);
   }
-  if (f->derived.settings.watches_sensors) {
+  if (has_option(f, MODEL_HAS_SENSOR_FAULT)) {
     watch_sensors(f, time, first ? 0.0 : step);
   }
   const double velocity_gain = find_kinematics(f, time, step);

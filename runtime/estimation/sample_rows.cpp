@@ -213,7 +213,8 @@ double sample_rows::read_jump(const friction_place& p) {
     add(before, 1.0);
     return jump;
   }
-  const double kept = before == 0.0 ? 0.0 : law_exponential(rest_exponent(finger_, p.slot));
+  const double kept =
+      before == 0.0 ? 0.0 : law_exponential(rest_exponent(finger_, p.slot, s.scalar[STATE_ABSORBED_BEFORE]));
   add(now, kept - 1.0);
   if (kept != 0.0) {
     add(before, -kept);

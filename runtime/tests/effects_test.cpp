@@ -216,8 +216,7 @@ TEST(Table, HasDifferentNamesAndNumbers) {
     EXPECT_EQ(effect_by_id(effect->id), effect);
     EXPECT_LE(effect->parameter_count, std::uint32_t{EFFECT_MAX_PARAMETERS});
     const effect_action& acts = *effect->action;
-    EXPECT_EQ(acts.state_count || acts.memory_count, acts.advance || acts.kind == EFFECT_SIGNAL)
-        << effect->name;
+    EXPECT_EQ(acts.state_count || acts.memory_count, acts.advance || acts.kind == EFFECT_SIGNAL) << effect->name;
     for (std::uint32_t p = 0; p < effect->parameter_count; ++p) {
       const effect_parameter& number = effect->parameters[p];
       EXPECT_GT(number.scale, 0.0) << effect->name << "." << number.name;

@@ -96,7 +96,7 @@ void weigh_forces(const tendonfmu_finger* f, const double* fault, double* weight
 }
 
 int any_joint_is_blind(const tendonfmu_finger* f) {
-  for (size_t j = 0; f->derived.settings.watches_sensors && j < f->joints; ++j) {
+  for (size_t j = 0; has_option(f, MODEL_HAS_SENSOR_FAULT) && j < f->joints; ++j) {
     if (f->remembered.watch[j] == JOINT_BLIND) {
       return 1;
     }

@@ -72,7 +72,5 @@ static effect_grip stribeck_grip(const extension_row* row, size_t member) {
                        .by_velocity = -change * at[SIDE] / values[STRIBECK_VELOCITY]};
 }
 
-const effect_action stribeck_action = {.kind = EFFECT_FRICTION,
-                                       .state_count = stribeck_state_count,
-                                       .advance = stribeck_advance,
-                                       .grip = stribeck_grip};
+const effect_action stribeck_action = {
+    .kind = EFFECT_FRICTION, .state_count = stribeck_state_count, .advance = stribeck_advance, .grip = stribeck_grip};

@@ -27,14 +27,14 @@ static void add_slope(const extension_row* row, correction_of correct, const eff
 }
 
 /* The effect whose correction a function gives. */
-#define BY_CORRECTION(effect, correction)                                                                    \
-  static void effect##_torque(const extension_row* row, const effect_sample* sample, double* torque) {       \
-    add_torque(row, correction, sample, torque);                                                             \
-  }                                                                                                          \
-  static void effect##_slope(const extension_row* row, const effect_sample* sample,                          \
-                             const effect_direction* direction, double* slope) {                             \
-    add_slope(row, correction, sample, direction, slope);                                                    \
-  }                                                                                                          \
+#define BY_CORRECTION(effect, correction)                                                                              \
+  static void effect##_torque(const extension_row* row, const effect_sample* sample, double* torque) {                 \
+    add_torque(row, correction, sample, torque);                                                                       \
+  }                                                                                                                    \
+  static void effect##_slope(const extension_row* row, const effect_sample* sample, const effect_direction* direction, \
+                             double* slope) {                                                                          \
+    add_slope(row, correction, sample, direction, slope);                                                              \
+  }                                                                                                                    \
   const effect_action effect##_action = {.kind = EFFECT_TORQUE, .torque = effect##_torque, .slope = effect##_slope}
 
 static arm_correction constant(const double* parameters, double angle) {

@@ -72,8 +72,5 @@ static void play_pass(const extension_row* row, effect_signals* direction) {
   }
 }
 
-const effect_action backlash_action = {.kind = EFFECT_SIGNAL,
-                                       .order = 1,
-                                       .memory_count = PLAY_NUMBERS,
-                                       .signal = play_signal,
-                                       .signal_pass = play_pass};
+const effect_action backlash_action = {
+    .kind = EFFECT_SIGNAL, .order = 1, .memory_count = PLAY_NUMBERS, .signal = play_signal, .signal_pass = play_pass};

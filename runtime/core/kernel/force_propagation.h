@@ -91,7 +91,7 @@ HOT_INLINE quad acting_friction(const tendonfmu_finger* f, const motion* m, quad
 
 /* |F| of one effect at some slots for the bands, whether it acts or not */
 HOT_INLINE void keep_limit(const tendonfmu_finger* f, double* limit, size_t slot, quad magnitude) {
-  if (f->derived.settings.has_bands) {
+  if (has_option(f, MODEL_DETECTS_BY_BANDS)) {
     quad_store(limit + slot, gripped(f, slot, magnitude));
   }
 }
@@ -99,7 +99,7 @@ HOT_INLINE void keep_limit(const tendonfmu_finger* f, double* limit, size_t slot
 /* whether F of some slots is 0 without a look at the laws: nothing moves, now or before, or slides; for the
  * bands, which need |F| of what sticks, only where it can hold no joint */
 HOT_INLINE int nothing_acts(const tendonfmu_finger* f, const motion* m) {
-  const int holds = f->derived.settings.has_bands && f->derived.can_hold[m->slot / 4];
+  const int holds = has_option(f, MODEL_DETECTS_BY_BANDS) && f->derived.can_hold[m->slot / 4];
   return !(holds | quad_bits(m->moving | m->moved | slides_at(f, m->slot)));
 }
 
@@ -292,12 +292,12 @@ static int find_friction(tendonfmu_finger* f) {
     const quad sum = quad_sum_rows(load + j), joint_friction = own_friction(f, j, sum);
     quad_store(s->load + j, sum);
     const quad slips = quad_sum_rows(tendon_friction + j) + joint_friction;
-    if (d->settings.has_bands) {
+    if (has_option(f, MODEL_DETECTS_BY_BANDS)) {
       quad_store(s->slip_torque + j, slips);
     }
     quad_store(s->friction + j, slips + cover);
   }
-  if (d->settings.has_bands) {
+  if (has_option(f, MODEL_DETECTS_BY_BANDS)) {
     friction_limits(f);
   }
   return transitions;
