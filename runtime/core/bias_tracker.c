@@ -14,11 +14,14 @@ static int moves_now(const tendonfmu_finger* f, size_t slot) {
   return fabs(f->scratch.velocity[slot]) > threshold_of(f, slot);
 }
 
+/* comes to rest or begins to move */
+static int changes(const tendonfmu_finger* f, size_t slot) {
+  return moves_now(f, slot) != (f->remembered.moving[slot] > 0.5);
+}
+
 static transition transition_at(const tendonfmu_finger* f, size_t slot) {
   const finger_state* s = &f->remembered;
-  const int now = moves_now(f, slot), before = s->moving[slot] > 0.5;
-  return (transition){.stops = before && !now,
-                      .starts = now && !before,
+  return (transition){.stops = s->moving[slot] > 0.5,
                       .side_before = s->side[slot],
                       .side_now = copysign(1.0, f->scratch.velocity[slot]),
                       .exponent = rest_exponent(f, slot, s->scalar[STATE_ABSORBED]),
@@ -38,9 +41,9 @@ dual jump_of(const transition* t, const effect_laws* laws) {
 
 static void jump_tendon(tendonfmu_finger* f, size_t joint, size_t tendon) {
   const size_t slot = joint * f->tendon_lanes + tendon;
-  const transition t = transition_at(f, slot);
   f->scratch.edge_bias[slot] = f->scratch.pulley_bias[slot] = 0.0;
-  if (t.stops || t.starts) {
+  if (changes(f, slot)) {
+    const transition t = transition_at(f, slot);
     const dual angle = {joint ? f->scratch.angle[joint - 1] : 0.0, 0.0};
     const effect_laws edge = edge_laws(f, joint, tendon, angle);
     const effect_laws pulley = {.below = f->derived.pulley_law + slot * LAW_NUMBERS};
@@ -50,9 +53,10 @@ static void jump_tendon(tendonfmu_finger* f, size_t joint, size_t tendon) {
 }
 
 static void jump_joint(tendonfmu_finger* f, size_t joint) {
-  const transition t = transition_at(f, f->joints * f->tendon_lanes + joint);
+  const size_t slot = f->joints * f->tendon_lanes + joint;
   f->scratch.joint_bias[joint] = f->scratch.load_bias[joint] = 0.0;
-  if (t.stops || t.starts) {
+  if (changes(f, slot)) {
+    const transition t = transition_at(f, slot);
     const effect_laws own = {.below = f->derived.joint_law + joint * LAW_NUMBERS};
     const effect_laws load = {.below = f->derived.load_law + joint * LAW_NUMBERS};
     f->scratch.joint_bias[joint] = jump_of(&t, &own).value;

@@ -6,7 +6,7 @@
 
 /* A slot that comes to rest or begins to move. */
 typedef struct transition {
-  int stops, starts;  /* one of them */
+  int stops;          /* else it starts */
   double side_before; /* s1 = sgn(v) of the last moving sample, 0: never moved */
   double side_now;    /* s2 = sgn(v) */
   double exponent;    /* of forgetting: what time or the filter has taken from its torque since it came to rest */

@@ -146,7 +146,6 @@ static dual bias_at(const linearisation* l, const effect_laws* laws, size_t slot
     return (dual){0.0, 0.0};
   }
   const transition t = {.stops = s->event[slot] > 0.0,
-                        .starts = s->event[slot] < 0.0,
                         .side_before = side_before(l->finger, slot),
                         .side_now = s->side[slot],
                         .exponent = rest_exponent(l->finger, slot, s->scalar[STATE_ABSORBED_BEFORE]),
