@@ -62,11 +62,11 @@ static int is_in_range(const input_row* row) {
 
 static int refuse_input(const input_row* row, double time, message_line message) {
   size_t i = 0;
-  while (fabs(row->values[i]) <= LARGEST_INPUT) {
+  while (i + 1 < row->count && fabs(row->to[i]) <= LARGEST_INPUT) {
     ++i;
   }
   return message_write(message, "%s[%zu] = %g at time %g s: expected a finite number of magnitude at most 1e+12 %s",
-                       row->name, i + 1, row->values[i], time, row->unit);
+                       row->name, i + 1, row->to[i], time, row->unit);
 }
 
 int samples_take_inputs(tendonfmu_finger* finger, double time, const tendonfmu_inputs* inputs, message_line message) {
