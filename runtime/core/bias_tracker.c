@@ -6,90 +6,62 @@
 
 #include "extensions.h"
 #include "finger_memory.h"
-#include "kernel_choice.h"
 
 /* --- jumps ----------------------------------------------------------------------------------------------------------
  */
-
-/* A slot at a transition. */
-typedef struct transition {
-  int stops, starts;
-  double side_before; /* s1 = sgn(v) of the last moving sample, 0: never moved */
-  double side_now;    /* s2 = sgn(v) */
-  double kept;        /* exp(−forget_rate·(last_stuck − stuck_since)) */
-  double threshold;   /* v_min */
-} transition;
-
-static double threshold_of(const tendonfmu_finger* f, size_t slot) {
-  const finger_settings* settings = &f->derived.settings;
-  return slot < f->joints * f->tendon_lanes ? settings->tendon_threshold : settings->joint_threshold;
-}
 
 static int moves_now(const tendonfmu_finger* f, size_t slot) {
   return fabs(f->scratch.velocity[slot]) > threshold_of(f, slot);
 }
 
-/* the exponent of forgetting: what time or the filter has taken from a slot's torque since it came to rest */
-static double forgotten(const tendonfmu_finger* f, size_t slot) {
-  const finger_state* s = &f->remembered;
-  const double since = s->stuck_since[slot];
-  return f->derived.settings.forgets_by_absorption ? s->scalar[STATE_ABSORBED] - since
-                                                   : f->derived.settings.forget_rate * (s->last_stuck[slot] - since);
+/* comes to rest or begins to move */
+static int changes(const tendonfmu_finger* f, size_t slot) {
+  return moves_now(f, slot) != (f->remembered.moving[slot] > 0.5);
 }
 
 static transition transition_at(const tendonfmu_finger* f, size_t slot) {
-  const int now = moves_now(f, slot), before = f->remembered.moving[slot] > 0.5;
-  return (transition){.stops = before && !now,
-                      .starts = now && !before,
-                      .side_before = f->remembered.side[slot],
+  const finger_state* s = &f->remembered;
+  return (transition){.stops = s->moving[slot] > 0.5,
+                      .side_before = s->side[slot],
                       .side_now = copysign(1.0, f->scratch.velocity[slot]),
-                      .kept = now && !before ? law_exponential(forgotten(f, slot)) : 0.0,
+                      .exponent = rest_exponent(f, slot, s->scalar[STATE_ABSORBED]),
                       .threshold = threshold_of(f, slot)};
 }
 
-/* |F| of an effect at v_min, on the side for v > 0 or v < 0 */
-static double magnitude(const effect_laws* laws, double side, double threshold) {
-  const size_t offset = side < 0.0 ? LAW_SIDE_NUMBERS : 0;
-  const double below = law_with_slopes(laws->below + offset, threshold).value;
-  if (!laws->above) {
-    return below;
-  }
-  return below + laws->weight * (law_with_slopes(laws->above + offset, threshold).value - below);
-}
-
-/* b of fig. 5 */
-static double jump(const transition* t, const effect_laws* laws) {
-  if (!t->stops && !t->starts) {
-    return 0.0;
-  }
-  const double before = t->side_before * magnitude(laws, t->side_before, t->threshold); /* 0 where it never moved */
+dual jump_of(const transition* t, const effect_laws* laws) {
+  const dual speed = {t->threshold, 0.0};
+  const dual before = scaled(t->side_before, magnitude_at(laws, t->side_before < 0.0, speed)); /* 0: it never moved */
   if (t->stops) {
     return before;
   }
-  const double now = t->side_now * magnitude(laws, t->side_now, t->threshold);
-  const double remembered = fabs(t->side_before) > 0.5 ? (before - now) * t->kept : 0.0;
-  return 0.0 - now - remembered;
+  const dual now = scaled(t->side_now, magnitude_at(laws, t->side_now < 0.0, speed));
+  const double kept = t->side_before == 0.0 ? 0.0 : law_exponential(t->exponent);
+  return sum(scaled(-1.0, now), scaled(-kept, difference(before, now)));
 }
 
 static void jump_tendon(tendonfmu_finger* f, size_t joint, size_t tendon) {
   const size_t slot = joint * f->tendon_lanes + tendon;
-  const transition t = transition_at(f, slot);
   f->scratch.edge_bias[slot] = f->scratch.pulley_bias[slot] = 0.0;
-  if (!t.stops && !t.starts) {
-    return;
+  if (changes(f, slot)) {
+    const transition t = transition_at(f, slot);
+    const dual angle = {joint ? f->scratch.angle[joint - 1] : 0.0, 0.0};
+    const effect_laws edge = edge_laws(f, joint, tendon, angle);
+    const effect_laws pulley = {.below = f->derived.pulley_law + slot * LAW_NUMBERS};
+    f->scratch.edge_bias[slot] = jump_of(&t, &edge).value;
+    f->scratch.pulley_bias[slot] = jump_of(&t, &pulley).value;
   }
-  const effect_laws edge = edge_laws(f, joint, tendon, joint ? f->scratch.angle[joint - 1] : 0.0, 0.0);
-  const effect_laws pulley = {.below = f->derived.pulley_law + slot * LAW_NUMBERS};
-  f->scratch.edge_bias[slot] = jump(&t, &edge);
-  f->scratch.pulley_bias[slot] = jump(&t, &pulley);
 }
 
 static void jump_joint(tendonfmu_finger* f, size_t joint) {
-  const transition t = transition_at(f, f->joints * f->tendon_lanes + joint);
-  const effect_laws own = {.below = f->derived.joint_law + joint * LAW_NUMBERS};
-  const effect_laws load = {.below = f->derived.load_law + joint * LAW_NUMBERS};
-  f->scratch.joint_bias[joint] = jump(&t, &own);
-  f->scratch.load_bias[joint] = jump(&t, &load);
+  const size_t slot = f->joints * f->tendon_lanes + joint;
+  f->scratch.joint_bias[joint] = f->scratch.load_bias[joint] = 0.0;
+  if (changes(f, slot)) {
+    const transition t = transition_at(f, slot);
+    const effect_laws own = {.below = f->derived.joint_law + joint * LAW_NUMBERS};
+    const effect_laws load = {.below = f->derived.load_law + joint * LAW_NUMBERS};
+    f->scratch.joint_bias[joint] = jump_of(&t, &own).value;
+    f->scratch.load_bias[joint] = jump_of(&t, &load).value;
+  }
 }
 
 /* Δb_j: eq. (10) with the b in place of the F, at the forces already propagated */
@@ -126,7 +98,7 @@ void find_bias_steps(tendonfmu_finger* f) {
 
 void remember_transitions(tendonfmu_finger* f, double time) {
   const finger_state* s = &f->remembered;
-  const double clock = f->derived.settings.forgets_by_absorption ? s->scalar[STATE_ABSORBED] : time;
+  const double clock = has_option(f, MODEL_FORGETS_BY_ABSORPTION) ? s->scalar[STATE_ABSORBED] : time;
   for (size_t slot = 0; slot < f->slots; ++slot) {
     const int now = moves_now(f, slot), before = s->moving[slot] > 0.5;
     s->event[slot] = now && !before ? s->side[slot] - 2.0 : before && !now ? 1.0 : 0.0;
@@ -136,9 +108,10 @@ void remember_transitions(tendonfmu_finger* f, double time) {
 }
 
 void hold_bias(tendonfmu_finger* f, double time) {
-  clear_lanes(f->remembered.gain, f->joint_lanes);
-  if (!f->derived.settings.forgets_by_absorption) {
-    f->kernel->restart_rests(f, time);
+  const finger_state* s = &f->remembered;
+  clear_lanes(s->gain, f->joint_lanes);
+  for (size_t slot = 0; !has_option(f, MODEL_FORGETS_BY_ABSORPTION) && slot < f->slots; ++slot) {
+    s->stuck_since[slot] = s->moving[slot] > 0.5 ? s->stuck_since[slot] : time;
   }
 }
 
@@ -192,7 +165,7 @@ static double kalman_gain(double predicted, double noise) {
 
 /* K with the variance of friction whose state nobody knows beside P⁻: it is distributed evenly */
 static double gain_of_joint(const tendonfmu_finger* f, size_t j, double predicted, double noise, double gain) {
-  if (!f->derived.settings.has_bands || f->guide.guides) {
+  if (!has_option(f, MODEL_DETECTS_BY_BANDS) || f->guide.guides) {
     return gain;
   }
   const double unknown = f->scratch.unknown[j];
@@ -217,7 +190,7 @@ void track_bias(tendonfmu_finger* f, double step, double noise) {
     s->variance[j] = (1.0 - gain) * predicted;
     left = j ? left : 1.0 - gain;
   }
-  if (f->derived.settings.forgets_by_absorption) {
+  if (has_option(f, MODEL_FORGETS_BY_ABSORPTION)) {
     count_absorbed(f, left);
   }
 }

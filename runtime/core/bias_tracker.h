@@ -4,6 +4,18 @@
 
 #include "finger_memory.h"
 
+/* A slot that comes to rest or begins to move. */
+typedef struct transition {
+  int stops;          /* else it starts */
+  double side_before; /* s1 = sgn(v) of the last moving sample, 0: never moved */
+  double side_now;    /* s2 = sgn(v) */
+  double exponent;    /* of forgetting: what time or the filter has taken from its torque since it came to rest */
+  double threshold;   /* v_min */
+} transition;
+
+/* b of an effect there. */
+dual jump_of(const transition* slot, const effect_laws* laws);
+
 /* Δb [n] of a sample in which something comes to rest or begins to move, into scratch. */
 void find_bias_steps(tendonfmu_finger* finger);
 

@@ -14,23 +14,17 @@ static const double stands_out = 5.0;      /* standard deviations */
 static const double largest_misfit = 1e12;
 static const double largest_torque = 1e30; /* N·m, far beyond what inputs make; a restored state may hold any */
 
-/* One weighted least-squares problem: Σ w²·(torque + lever · F)². */
-typedef struct problem {
-  size_t joints;
-  const double *lever, *torque, *deviation;
-  double smallest; /* deviation, of which the weights are multiples: none is above 1 */
-} problem;
-
-static double weight(const problem* p, size_t joint) {
-  return p->deviation ? p->smallest / p->deviation[joint] : 1.0;
-}
-
-static problem pose(size_t joints, const double* lever, const double* torque, const double* deviation) {
-  problem p = {joints, lever, torque, deviation, 1.0};
-  for (size_t j = 0; deviation && j < joints; ++j) {
-    p.smallest = j == 0 || deviation[j] < p.smallest ? deviation[j] : p.smallest;
+/* Weights of the joints in Σ w²·(torque + lever · F)², multiples of the smallest deviation, none above 1; returns that
+ * one. */
+static double weigh_joints(size_t joints, const double* deviation, double* weight) {
+  double smallest = deviation ? deviation[0] : 1.0;
+  for (size_t j = 1; deviation && j < joints; ++j) {
+    smallest = deviation[j] < smallest ? deviation[j] : smallest;
   }
-  return p;
+  for (size_t j = 0; j < joints; ++j) {
+    weight[j] = deviation ? smallest / deviation[j] : 1.0;
+  }
+  return smallest;
 }
 
 /* Σ a_j·b_j over the joints */
@@ -50,37 +44,39 @@ typedef struct principal {
   double pull[3];                      /* of the weighted torques along them */
 } principal;
 
-static principal find_principal(const problem* p) {
+static principal find_principal(size_t joints, const double* lever, const double* torque, const double* weight) {
   principal of;
   double weighted[MODEL_MAX_JOINTS];
-  for (size_t j = 0; j < p->joints; ++j) {
+  for (size_t j = 0; j < joints; ++j) {
     for (size_t i = 0; i < 3; ++i) {
-      of.torque[i * p->joints + j] = weight(p, j) * p->lever[3 * j + i];
+      of.torque[i * joints + j] = weight[j] * lever[3 * j + i];
     }
-    weighted[j] = weight(p, j) * p->torque[j];
+    weighted[j] = weight[j] * torque[j];
   }
-  orthogonal_columns(p->joints, 3, of.torque, of.direction);
+  orthogonal_columns(joints, 3, of.torque, of.direction);
   for (size_t k = 0; k < 3; ++k) {
-    of.value[k] = dot(p->joints, of.torque + k * p->joints, of.torque + k * p->joints);
-    of.pull[k] = -dot(p->joints, of.torque + k * p->joints, weighted);
+    const double* along = of.torque + k * joints;
+    of.value[k] = dot(joints, along, along);
+    of.pull[k] = -dot(joints, along, weighted);
   }
   of.largest = fmax(of.value[0], fmax(of.value[1], of.value[2]));
   return of;
 }
 
-static double least_sum(const problem* p, const double force[3]) {
+static double least_sum(size_t joints, const double* lever, const double* torque, const double* deviation,
+                        const double force[3]) {
   double sum = 0.0;
-  for (size_t j = 0; j < p->joints; ++j) {
-    const double* lever = p->lever + 3 * j;
-    const double left = p->torque[j] + lever[0] * force[0] + lever[1] * force[1] + lever[2] * force[2];
-    sum += left / p->deviation[j] * (left / p->deviation[j]);
+  for (size_t j = 0; j < joints; ++j, lever += 3) {
+    const double left = torque[j] + lever[0] * force[0] + lever[1] * force[1] + lever[2] * force[2];
+    sum += left / deviation[j] * (left / deviation[j]);
   }
   return sum;
 }
 
 tip_force find_tip_force(size_t joints, const double* lever, const double* torque, const double* deviation) {
-  const problem p = pose(joints, lever, torque, deviation);
-  const principal of = find_principal(&p);
+  double weight[MODEL_MAX_JOINTS];
+  const double smallest = weigh_joints(joints, deviation, weight);
+  const principal of = find_principal(joints, lever, torque, weight);
   const double largest = of.largest;
   tip_force found = {.observable = 0};
   double best[3] = {0.0, 0.0, 0.0}, variance[3] = {0.0, 0.0, 0.0};
@@ -103,10 +99,10 @@ tip_force find_tip_force(size_t joints, const double* lever, const double* torqu
   }
   found.observable = told == 3;
   for (int i = 0; deviation && i < 3; ++i) {
-    found.deviation[i] = told ? p.smallest * sqrt(variance[i]) / sqrt(largest) : 0.0;
+    found.deviation[i] = told ? smallest * sqrt(variance[i]) / sqrt(largest) : 0.0;
   }
   if (deviation && joints > turning) {
-    found.misfit = fmin(largest_misfit, least_sum(&p, best) / (double)(joints - turning));
+    found.misfit = fmin(largest_misfit, least_sum(joints, lever, torque, deviation, best) / (double)(joints - turning));
   }
   return found;
 }
@@ -122,7 +118,7 @@ int find_contact_link(size_t joints, const int* least, const double* torque, con
 
 /* compensated_torque_std of all joints; NULL where it is not known */
 static const double* find_deviations(const tendonfmu_finger* f, double* deviation) {
-  int known = (f->shape.options & MODEL_HAS_DEVIATION) != 0;
+  int known = has_option(f, MODEL_HAS_DEVIATION);
   for (size_t j = 0; j < f->joints; ++j) {
     deviation[j] = sqrt(f->remembered.total_variance[j]);
     known = known && deviation[j] > 0.0;
@@ -135,7 +131,7 @@ contact_place find_contact_place(const tendonfmu_finger* finger) {
   const size_t n = finger->joints;
   double lever[3 * MODEL_MAX_JOINTS], room[MODEL_MAX_JOINTS] = {0.0}, torque[MODEL_MAX_JOINTS] = {0.0};
   contact_place found = {.link = 0};
-  if (finger->shape.options & MODEL_HAS_LINKS) {
+  if (has_option(finger, MODEL_HAS_LINKS)) {
     const double* deviation = find_deviations(finger, room);
     find_tip_levers(&finger->derived.links, n, s->angle, lever);
     for (size_t j = 0; j < n; ++j) {

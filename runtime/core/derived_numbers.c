@@ -130,6 +130,7 @@ static int derive_item(void* context, const model_item* item) {
     case ITEM_JOINT_FRICTION: pack_law(to->joint_law + j * LAW_NUMBERS, values, item->law); break;
     case ITEM_LOAD_FRICTION: pack_law(to->load_law + j * LAW_NUMBERS, values, item->law); break;
     case ITEM_STIFFNESS:
+      to->bidirectional[i] = item->bidirectional;
       to->stiffness[i] = values[0];
       to->inverse_stiffness[i] = bounded_inverse(values[0]);
       break;
@@ -187,7 +188,7 @@ static void derive_routing(tendonfmu_finger* f) {
       matrix[i * n + j] = f->derived.moment_arm[j * lanes + i];
     }
   }
-  for (size_t at = 0; f->derived.settings.has_bands && at < n * lanes; ++at) {
+  for (size_t at = 0; has_option(f, MODEL_DETECTS_BY_BANDS) && at < n * lanes; ++at) {
     f->derived.load_arm[at] = f->derived.moment_arm[at] * f->derived.stiffness[at % lanes];
   }
   pseudo_inverse(m, n, matrix, matrix);
@@ -196,51 +197,33 @@ static void derive_routing(tendonfmu_finger* f) {
   }
 }
 
-static void derive_flags(tendonfmu_finger* f) {
-  const uint32_t* word = f->shape.words + f->joints;
-  for (size_t i = 0; i < f->tendons; ++i) {
-    f->derived.bidirectional[i] = *word & 1 ? 1.0 : 0.0;
-    word += 1 + f->joints;
-    for (size_t j = 0; j < f->joints; ++j) {
-      word += 1 + (*word & ~MODEL_EDGE_HAS_ANGLES);
-    }
+void recall_sample(tendonfmu_finger* f) {
+  memcpy(f->next, f->state + (f->state_count - f->next_count), f->next_count * sizeof(double));
+  if (has_option(f, MODEL_HAS_SENSOR_FAULT)) {
+    use_rows(f, f->remembered.sensor.fault);
   }
-}
-
-void forget_views(tendonfmu_finger* finger) {
-  for (size_t k = 0; k < finger->slots / 4; ++k) {
-    for (size_t lane = 0; lane < 4; ++lane) {
-      finger->scratch.view[k].key[lane] = -1.0;
-    }
+  for (size_t slot = 0; slot < f->slots; ++slot) {
+    f->scratch.view[slot / 4].key[slot % 4] = -1.0;
   }
 }
 
 void derive_numbers(tendonfmu_finger* finger, int routing_changed) {
   /* record 0 and 1 stay zero: edges without friction */
   derivation d = {.finger = finger, .values = finger->parameters, .next_record = 2};
-  const uint32_t options = finger->shape.options;
-  finger->derived.settings = (finger_settings){.initial_variance = -1.0,
-                                               .noise_time = -1.0,
-                                               .forgets_by_absorption = (options & MODEL_FORGETS_BY_ABSORPTION) != 0,
-                                               .has_initial_torque = (options & MODEL_HAS_INITIAL_TORQUE) != 0,
-                                               .has_tendon_zero = (options & MODEL_HAS_TENDON_ZERO) != 0,
-                                               .has_bands = (options & MODEL_DETECTS_BY_BANDS) != 0,
-                                               .watches_motors = (options & MODEL_WATCHES_MOTORS) != 0,
-                                               .watches_sensors = (options & MODEL_HAS_SENSOR_FAULT) != 0};
+  finger->derived.settings = (finger_settings){
+      .initial_variance = -1.0, .noise_time = -1.0, .has_initial_torque = has_option(finger, MODEL_HAS_INITIAL_TORQUE)};
   clear_grids(finger);
   model_visit(&finger->shape, derive_item, &d);
   finger->derived.settings.cutoff_rate *= two_pi;
-  if (options & MODEL_HAS_LINKS) {
+  if (has_option(finger, MODEL_HAS_LINKS)) {
     find_least_links(&finger->derived.links, finger->joints, finger->derived.least_link);
   }
-  derive_flags(finger);
   if (routing_changed) {
     derive_routing(finger);
     find_what_can_hold(finger);
   }
   find_extensions(finger);
-  recall_rows(finger);
-  forget_views(finger);
+  recall_sample(finger);
 }
 
 void take_prepared_numbers(tendonfmu_finger* finger, const tendonfmu_finger* prepared) {
@@ -249,8 +232,7 @@ void take_prepared_numbers(tendonfmu_finger* finger, const tendonfmu_finger* pre
   finger->memory.compliance = prepared->memory.compliance;
   finger->memory.relaxes = prepared->memory.relaxes;
   finger->memory.step = prepared->memory.step;
-  recall_rows(finger);
-  forget_views(finger);
+  recall_sample(finger);
 }
 
 /* --- the laws in force at a slot ---------------------------------------------------------------------------------- */
@@ -265,15 +247,27 @@ size_t slot_segment(const tendonfmu_finger* finger, size_t joint, size_t tendon,
   return passed;
 }
 
-effect_laws edge_laws(const tendonfmu_finger* finger, size_t joint, size_t tendon, double angle, double angle_slope) {
+effect_laws edge_laws(const tendonfmu_finger* finger, size_t joint, size_t tendon, dual angle) {
   const derived_numbers* d = &finger->derived;
   const size_t slot = joint * finger->tendon_lanes + tendon;
-  const size_t record = d->edge_record[slot] + slot_segment(finger, joint, tendon, angle);
-  const double* segment = d->edge_segment + 2 * record;
-  return (effect_laws){.below = d->edge_law + record * LAW_NUMBERS,
-                       .above = d->edge_law + (record + 1) * LAW_NUMBERS,
-                       .weight = (angle - segment[0]) * segment[1],
-                       .weight_slope = angle_slope * segment[1]};
+  const size_t record = d->edge_record[slot] + slot_segment(finger, joint, tendon, angle.value);
+  const double *segment = d->edge_segment + 2 * record, *law = d->edge_law + record * LAW_NUMBERS;
+  return (effect_laws){.below = law,
+                       .above = law + LAW_NUMBERS,
+                       .weight = {(angle.value - segment[0]) * segment[1], angle.slope * segment[1]}};
+}
+
+static dual law_at(const double* law, int negative, dual speed) {
+  const law_slopes of = law_with_slopes(law + negative * LAW_SIDE_NUMBERS, speed.value);
+  return (dual){of.value, of.by_speed * speed.slope};
+}
+
+dual magnitude_at(const effect_laws* laws, int negative, dual speed) {
+  const dual below = law_at(laws->below, negative, speed);
+  if (!laws->above) {
+    return below;
+  }
+  return sum(below, product(laws->weight, difference(law_at(laws->above, negative, speed), below)));
 }
 
 static void put_side(double rows[LAW_SIDE_NUMBERS][4], size_t lane, const double* law, int negative) {

@@ -5,27 +5,9 @@
 #include <math.h>
 #include <string.h>
 
+#include "bias_tracker.h"
 #include "extensions.h"
-#include "finger_memory.h"
 #include "sensor_fault.h"
-
-/* A number and its derivative along the direction. */
-typedef struct dual {
-  double value, slope;
-} dual;
-
-static dual product(dual a, dual b) {
-  return (dual){a.value * b.value, a.slope * b.value + a.value * b.slope};
-}
-static dual sum(dual a, dual b) {
-  return (dual){a.value + b.value, a.slope + b.slope};
-}
-static dual difference(dual a, dual b) {
-  return (dual){a.value - b.value, a.slope - b.slope};
-}
-static dual scaled(double factor, dual a) {
-  return (dual){factor * a.value, factor * a.slope};
-}
 
 /* The sample, its direction, and what is summed over the tendons. */
 typedef struct linearisation {
@@ -52,8 +34,8 @@ typedef struct signal_derivative {
 static void pass_signals(const tendonfmu_finger* f, effect_signals* direction, int late) {
   direction->late = late;
   for (size_t r = 0; r < f->extensions.signals; ++r) {
-    const extension_row* row = signal_row(f, r);
-    row->effect->signal_pass(row->place, row->parameters, row->memory, direction);
+    const extension_row* row = f->extensions.signal + r;
+    row->action->signal_pass(row, direction);
   }
 }
 
@@ -109,36 +91,22 @@ static void linearise_kinematics(linearisation* l, const signal_derivative* d) {
 /* --- friction values and bias jumps ---------------------------------------------------------------------------------
  */
 
-/* |F| on one side of a law at a speed that varies */
-static dual law_at(const double* law, int negative, dual speed) {
-  const law_slopes slopes = law_with_slopes(law + negative * LAW_SIDE_NUMBERS, speed.value);
-  return (dual){slopes.value, slopes.by_speed * speed.slope};
-}
-
-static dual magnitude_at(const effect_laws* laws, int negative, dual speed) {
-  const dual below = law_at(laws->below, negative, speed);
-  if (!laws->above) {
-    return below;
-  }
-  const dual weight = {laws->weight, laws->weight_slope};
-  return sum(below, product(weight, difference(law_at(laws->above, negative, speed), below)));
-}
-
 /* what friction rows make of F and b */
 static dual slot_grip(const linearisation* l, size_t slot, dual velocity) {
-  if (!l->finger->extensions.friction) {
+  const finger_scratch* s = &l->finger->scratch;
+  if (!l->finger->extensions.frictions) {
     return (dual){1.0, 0.0};
   }
-  return (dual){slot_grip_of(l->finger, slot), slot_grip_slope(l->finger, slot, velocity.slope)};
+  return (dual){s->grip[slot], s->grip_slope[slot] * velocity.slope};
 }
 
 /* |F| at the present velocity where friction has a memory, else F: 0 where the effect sticks */
-static dual friction_at(const linearisation* l, const effect_laws* laws, size_t slot, double threshold, dual velocity) {
+static dual friction_at(const linearisation* l, const effect_laws* laws, size_t slot, dual velocity) {
   const finger_state* s = &l->finger->remembered;
   const dual grip = slot_grip(l, slot, velocity);
   if (remembers_at(l->finger, slot)) {
     const double sign = velocity.value < 0.0 ? -1.0 : 1.0;
-    const int negative = sliding_side(velocity.value, threshold, s->side[slot]);
+    const int negative = sliding_side(velocity.value, threshold_of(l->finger, slot), s->side[slot]);
     return product(grip, magnitude_at(laws, negative, scaled(sign, velocity)));
   }
   if (s->moving[slot] == 0.0) {
@@ -172,21 +140,17 @@ static dual loss_at(const linearisation* l, size_t slot, size_t row, dual fricti
 }
 
 /* b of fig. 5 at the last sample */
-static dual bias_at(const linearisation* l, const effect_laws* laws, size_t slot, double threshold, dual velocity) {
+static dual bias_at(const linearisation* l, const effect_laws* laws, size_t slot, dual velocity) {
   const finger_state* s = &l->finger->remembered;
-  const dual speed = {threshold, 0.0};
-  const double before = side_before(l->finger, slot), now = s->side[slot];
   if (s->event[slot] == 0.0 || remembers_at(l->finger, slot)) {
     return (dual){0.0, 0.0};
   }
-  const dual grip = slot_grip(l, slot, velocity);
-  const dual friction_before = product(grip, scaled(before, magnitude_at(laws, before < 0.0, speed)));
-  if (s->event[slot] > 0.0) {
-    return friction_before;
-  }
-  const dual friction_now = product(grip, scaled(now, magnitude_at(laws, now < 0.0, speed)));
-  const double kept = before == 0.0 ? 0.0 : law_exponential(rest_exponent(l->finger, slot));
-  return sum(scaled(-1.0, friction_now), scaled(-kept, difference(friction_before, friction_now)));
+  const transition t = {.stops = s->event[slot] > 0.0,
+                        .side_before = side_before(l->finger, slot),
+                        .side_now = s->side[slot],
+                        .exponent = rest_exponent(l->finger, slot, s->scalar[STATE_ABSORBED_BEFORE]),
+                        .threshold = threshold_of(l->finger, slot)};
+  return product(slot_grip(l, slot, velocity), jump_of(&t, laws));
 }
 
 /* --- forces along one tendon ----------------------------------------------------------------------------------------
@@ -203,44 +167,48 @@ static dual acting(const tendonfmu_finger* f, size_t i, dual* force) {
   return *force;
 }
 
+/* A tendon up to some place. */
+typedef struct tendon_force {
+  size_t tendon;
+  dual force, acts;  /* behind the last place; as it multiplies an F or a b */
+  dual lost, jumped; /* up to there: Σ of the losses, of the b */
+} tendon_force;
+
+/* past an edge or a pulley; motion: slope of the travel there */
+static void pass_place(const linearisation* l, const effect_laws* laws, size_t slot, size_t row, dual velocity,
+                       double motion, tendon_force* t) {
+  const dual friction = friction_at(l, laws, slot, velocity);
+  const dual loss = loss_at(l, slot, row, friction, t->acts, motion, t->force.slope);
+  t->jumped = sum(t->jumped, product(t->acts, bias_at(l, laws, slot, velocity)));
+  t->lost = sum(t->lost, loss);
+  t->force = difference(t->force, loss);
+  t->acts = acting(l->finger, t->tendon, &t->force);
+}
+
 static void linearise_tendon(linearisation* l, size_t i, double force_slope) {
   const tendonfmu_finger* f = l->finger;
   const size_t lanes = f->tendon_lanes;
-  const double threshold = f->derived.settings.tendon_threshold;
   dual velocity[MODEL_MAX_JOINTS + 1] = {{0.0, 0.0}};
   double motion[MODEL_MAX_JOINTS + 1] = {0.0};
-  velocity[f->joints] = (dual){0.0, 0.0};
   for (size_t j = f->joints; j-- > 0;) {
     const double arm = f->derived.moment_arm[j * lanes + i];
     velocity[j] = sum(velocity[j + 1], scaled(arm, l->speed[j]));
     motion[j] = motion[j + 1] + arm * l->motion[j];
   }
-  dual force = {f->remembered.force[i], force_slope}, lost = {0.0, 0.0}, jumped = {0.0, 0.0};
-  dual acts = acting(f, i, &force);
+  tendon_force t = {.tendon = i, .force = {f->remembered.force[i], force_slope}};
+  t.acts = acting(f, i, &t.force);
   for (size_t j = 0; j < f->joints; ++j) {
     const size_t slot = j * lanes + i;
-    const dual angle = j ? l->angle[j - 1] : (dual){0.0, 0.0};
-    const effect_laws edge = edge_laws(f, j, i, angle.value, angle.slope);
-    const dual edge_friction = friction_at(l, &edge, slot, threshold, velocity[j]);
-    const dual edge_loss = loss_at(l, slot, 0, edge_friction, acts, motion[j], force.slope);
-    jumped = sum(jumped, product(acts, bias_at(l, &edge, slot, threshold, velocity[j])));
-    lost = sum(lost, edge_loss);
-    force = difference(force, edge_loss);
-    acts = acting(f, i, &force);
-    l->load[j] = sum(l->load[j], acts);
+    const effect_laws edge = edge_laws(f, j, i, j ? l->angle[j - 1] : (dual){0.0, 0.0});
+    pass_place(l, &edge, slot, 0, velocity[j], motion[j], &t);
+    l->load[j] = sum(l->load[j], t.acts);
     if (j + 1 < f->joints) {
       const effect_laws pulley = {.below = f->derived.pulley_law + (slot + lanes) * LAW_NUMBERS};
-      const dual pulley_friction = friction_at(l, &pulley, slot + lanes, threshold, velocity[j + 1]);
-      const dual pulley_loss = loss_at(l, slot + lanes, 1, pulley_friction, acts, motion[j + 1], force.slope);
-      const dual bias = bias_at(l, &pulley, slot + lanes, threshold, velocity[j + 1]);
-      jumped = sum(jumped, product(acts, bias));
-      lost = sum(lost, pulley_loss);
-      force = difference(force, pulley_loss);
-      acts = acting(f, i, &force);
+      pass_place(l, &pulley, slot + lanes, 1, velocity[j + 1], motion[j + 1], &t);
     }
     const double arm = f->derived.moment_arm[slot];
-    l->friction[j] = sum(l->friction[j], scaled(arm, lost));
-    l->bias_step[j] = sum(l->bias_step[j], scaled(arm, jumped));
+    l->friction[j] = sum(l->friction[j], scaled(arm, t.lost));
+    l->bias_step[j] = sum(l->bias_step[j], scaled(arm, t.jumped));
   }
 }
 
@@ -261,14 +229,13 @@ static dual own_friction(const linearisation* l, size_t j, dual own, dual load) 
 static void linearise_joints(linearisation* l) {
   const tendonfmu_finger* f = l->finger;
   const size_t joint_row = f->joints * f->tendon_lanes;
-  const double threshold = f->derived.settings.joint_threshold;
   for (size_t j = 0; j < f->joints; ++j) {
     const effect_laws own = {.below = f->derived.joint_law + j * LAW_NUMBERS};
     const effect_laws loaded = {.below = f->derived.load_law + j * LAW_NUMBERS};
-    const dual joint_friction = friction_at(l, &own, joint_row + j, threshold, l->speed[j]);
-    const dual load_friction = friction_at(l, &loaded, joint_row + j, threshold, l->speed[j]);
-    const dual own_bias = bias_at(l, &own, joint_row + j, threshold, l->speed[j]);
-    const dual load_bias = bias_at(l, &loaded, joint_row + j, threshold, l->speed[j]);
+    const dual joint_friction = friction_at(l, &own, joint_row + j, l->speed[j]);
+    const dual load_friction = friction_at(l, &loaded, joint_row + j, l->speed[j]);
+    const dual own_bias = bias_at(l, &own, joint_row + j, l->speed[j]);
+    const dual load_bias = bias_at(l, &loaded, joint_row + j, l->speed[j]);
     const dual cover = scaled(f->derived.cover_stiffness[j], l->angle[j]);
     const dual friction = own_friction(l, j, joint_friction, product(load_friction, l->load[j]));
     l->friction[j] = sum(l->friction[j], sum(friction, cover));
@@ -292,13 +259,15 @@ static double motion_at(const linearisation* l, size_t slot) {
 /* adds what friction as a torque owes to how it builds up at its places */
 static void add_followed(const linearisation* l, const extension_row* row, const effect_sample* sample, double* slope) {
   const tendonfmu_finger* f = l->finger;
-  const double size = row->effect->size(row->place, row->parameters, sample);
+  const double size = row->action->size(row, sample);
   double slopes[MODEL_MAX_JOINTS] = {0.0};
+  extension_row built_up = *row;
+  built_up.now = slopes;
   for (size_t k = 0; k < row->memory_count; ++k) {
-    const size_t slot = row->effect->slot(row->place, f->joints, f->tendon_lanes, k);
+    const size_t slot = row->action->slot(row, f->joints, f->tendon_lanes, k);
     slopes[k] = follower_slope(f, row, k, size) * motion_at(l, slot);
   }
-  row->effect->torque(row->place, row->parameters, sample, slopes, slope);
+  row->action->torque(&built_up, sample, slope);
 }
 
 /* slope of what torque rows add to the limits of joints whose friction has a memory */
@@ -308,11 +277,12 @@ static void linearise_limits(linearisation* l, const double* force) {
   const effect_sample sample = remembered_sample(f);
   const effect_direction direction = {.force = force};
   for (size_t r = 0; r < f->extensions.torques; ++r) {
-    const extension_row* row = torque_row(f, r);
-    const size_t slot = row->effect->slot ? row->effect->slot(row->place, f->joints, f->tendon_lanes, 0) : 0;
+    extension_row row = f->extensions.torque[r];
+    const size_t slot = row.action->slot ? row.action->slot(&row, f->joints, f->tendon_lanes, 0) : 0;
     if (slot >= joint_row && remembers_at(f, slot)) {
-      const double whole = 1.0;
-      row->effect->slope(row->place, row->parameters, &sample, &whole, &direction, l->own_limit);
+      double whole = 1.0;
+      row.now = &whole;
+      row.action->slope(&row, &sample, &direction, l->own_limit);
     }
   }
 }
@@ -331,11 +301,11 @@ static void linearise_extensions(linearisation* l, const double* force) {
   const effect_sample sample = remembered_sample(f);
   const effect_direction direction = {.angle = angle, .velocity = velocity, .force = force};
   for (size_t r = 0; r < f->extensions.torques; ++r) {
-    const extension_row* row = torque_row(f, r);
-    if (row->effect->slope) {
-      row->effect->slope(row->place, row->parameters, &sample, row->memory, &direction, slope);
+    const extension_row* row = f->extensions.torque + r;
+    if (row->action->slope) {
+      row->action->slope(row, &sample, &direction, slope);
     }
-    if (row->effect->slot && f->memory.elements) {
+    if (row->action->slot && f->memory.elements) {
       add_followed(l, row, &sample, slope);
     }
   }
@@ -348,7 +318,7 @@ static void linearise_extensions(linearisation* l, const double* force) {
 static void linearise_mean(linearisation* l, const double* direction) {
   const tendonfmu_finger* f = l->finger;
   double sound[MODEL_MAX_TENDONS];
-  const int watches = f->derived.settings.watches_sensors;
+  const int watches = has_option(f, MODEL_HAS_SENSOR_FAULT);
   if (watches) {
     weigh_forces(f, f->remembered.sensor.fault, sound);
   }
@@ -393,7 +363,7 @@ static void write_joint(const linearisation* l, size_t j, const tendonfmu_output
   const double torque = l->torque_slope[j], friction = l->friction[j].slope;
   double bias = l->bias_step[j].slope;
   double total = friction + bias;
-  const int begins_anew = f->derived.settings.watches_sensors && f->remembered.watch[j] == JOINT_BEGINS_ANEW;
+  const int begins_anew = has_option(f, MODEL_HAS_SENSOR_FAULT) && f->remembered.watch[j] == JOINT_BEGINS_ANEW;
   if (begins_anew) {
     bias = torque - friction;
     total = torque;
@@ -422,9 +392,10 @@ static void linearise_torques(linearisation* l, const double* force) {
   linearise_extensions(l, force);
 }
 
-void directional_derivative(const tendonfmu_finger* finger, const tendonfmu_inputs* direction,
+void directional_derivative(tendonfmu_finger* finger, const tendonfmu_inputs* direction,
                             const tendonfmu_outputs* derivative) {
   linearisation l = {.finger = finger};
+  find_grips(finger); /* scratch may be of a sample that was refused */
   signal_derivative signals;
   input_direction(finger, direction, &signals);
   linearise_kinematics(&l, &signals);

@@ -14,11 +14,11 @@ static const effect_type* effect_of(const tendonfmu_finger* f, uint32_t index) {
   return effect_by_id(f->shape.extensions[(size_t)index * MODEL_EXTENSION_WORDS]);
 }
 
-/* the rows of a kind from `begin` on; how many. Numbers and memory of all rows follow each other as in the description,
+/* the rows of a kind, from `to` on; how many. Numbers and memory of all rows follow each other as in the description,
  * the numbers behind all others. */
-static size_t note_kind(tendonfmu_finger* f, effect_kind kind, int order, size_t begin) {
+static size_t note_kind(tendonfmu_finger* f, effect_kind kind, int order, extension_row* to) {
   const double* numbers = f->parameters + f->shape.parameter_count;
-  size_t found = begin, memory = 0;
+  size_t found = 0, memory = 0;
   for (uint32_t i = 0; i < f->shape.extension_count; ++i) {
     numbers -= effect_of(f, i)->parameter_count;
   }
@@ -26,22 +26,22 @@ static size_t note_kind(tendonfmu_finger* f, effect_kind kind, int order, size_t
     const effect_type* effect = effect_of(f, i);
     const effect_place place = model_extension_place(&f->shape, i);
     const size_t own = model_extension_memory(effect, &f->shape, place);
-    if (effect->kind == kind && effect->order == order) {
-      f->extensions.row[found++] = (extension_row){.effect = effect,
-                                                   .place = place,
-                                                   .parameters = numbers,
-                                                   .memory = own ? f->remembered.extension + memory : NULL,
-                                                   .next = own ? f->scratch.extension + memory : NULL,
-                                                   .memory_count = own};
+    if (effect->action->kind == kind && effect->action->order == order) {
+      to[found++] = (extension_row){.action = effect->action,
+                                    .place = place,
+                                    .parameters = numbers,
+                                    .before = own ? f->remembered.extension + memory : NULL,
+                                    .now = own ? f->scratch.extension + memory : NULL,
+                                    .memory_count = own};
     }
     numbers += effect->parameter_count;
     memory += own;
   }
-  return found - begin;
+  return found;
 }
 
 static void find_axis_cosines(tendonfmu_finger* f) {
-  const int linked = (f->shape.options & MODEL_HAS_LINKS) != 0;
+  const int linked = has_option(f, MODEL_HAS_LINKS);
   const double* axis = f->derived.links.axis; /* unit vectors */
   for (size_t j = 0; j < f->joints; ++j) {
     for (size_t k = 0; k < f->joints; ++k) {
@@ -59,6 +59,7 @@ static void find_axis_cosines(tendonfmu_finger* f) {
 static void clear_grips(tendonfmu_finger* f) {
   for (size_t slot = 0; slot < f->slots; ++slot) {
     f->scratch.grip[slot] = 1.0;
+    f->scratch.grip_slope[slot] = 0.0;
     f->scratch.bias_grip[slot] = f->memory.elements && f->memory.remembers[slot] != 0.0 ? 0.0 : 1.0;
   }
 }
@@ -67,69 +68,68 @@ void find_extensions(tendonfmu_finger* f) {
   if (!f->shape.extension_count) {
     return;
   }
-  size_t signals = 0;
+  extension_rows* rows = &f->extensions;
+  rows->signals = 0;
   for (int order = 0; order < SIGNAL_ORDERS; ++order) {
-    signals += note_kind(f, EFFECT_SIGNAL, order, signals);
+    rows->signals += note_kind(f, EFFECT_SIGNAL, order, rows->signal + rows->signals);
   }
-  f->extensions.signals = signals;
-  f->extensions.friction = note_kind(f, EFFECT_FRICTION, 0, signals);
-  f->extensions.torques = note_kind(f, EFFECT_TORQUE, 0, signals + f->extensions.friction);
-  const size_t others = signals + f->extensions.friction + f->extensions.torques;
-  f->extensions.memory = note_kind(f, EFFECT_MEMORY, 0, others);
+  rows->friction = rows->signal + rows->signals;
+  rows->frictions = note_kind(f, EFFECT_FRICTION, 0, rows->friction);
+  rows->torque = rows->friction + rows->frictions;
+  rows->torques = note_kind(f, EFFECT_TORQUE, 0, rows->torque);
+  rows->memory = rows->torque + rows->torques;
+  rows->memories = note_kind(f, EFFECT_MEMORY, 0, rows->memory);
   find_axis_cosines(f);
   find_memory(f);
   clear_grips(f);
-  f->extensions.gripped = f->extensions.friction > 0 || f->memory.elements > 0;
+  rows->gripped = rows->frictions > 0 || f->memory.elements > 0;
 }
 
 /* --- what the others remember ---------------------------------------------------------------------------------------
  */
 
+/* of the finger alone */
+static effect_sample sample_of_finger(const tendonfmu_finger* f) {
+  return (effect_sample){.joints = f->joints,
+                         .tendons = f->tendons,
+                         .lanes = f->tendon_lanes,
+                         .source = source_of(f),
+                         .moment_arm = f->derived.moment_arm,
+                         .rest_angle = f->derived.cover_rest,
+                         .axis_cosine = f->derived.axis_cosine,
+                         .tendon_threshold = f->derived.settings.tendon_threshold,
+                         .joint_threshold = f->derived.settings.joint_threshold};
+}
+
 void advance_extensions(tendonfmu_finger* f, double time, double step) {
   const finger_scratch* s = &f->scratch;
-  const size_t others = f->extensions.signals + f->extensions.friction + f->extensions.torques;
-  f->scratch.sample = (effect_sample){.joints = f->joints,
-                                      .tendons = f->tendons,
-                                      .lanes = f->tendon_lanes,
-                                      .first = is_first(f),
-                                      .source = source_of(f),
-                                      .time = time,
-                                      .step = step,
-                                      .angle = s->angle,
-                                      .velocity = s->velocity + f->joints * f->tendon_lanes,
-                                      .tendon_velocity = s->velocity,
-                                      .force = s->force,
-                                      .moment_arm = f->derived.moment_arm,
-                                      .rest_angle = f->derived.cover_rest,
-                                      .axis_cosine = f->derived.axis_cosine,
-                                      .tendon_threshold = f->derived.settings.tendon_threshold,
-                                      .joint_threshold = f->derived.settings.joint_threshold};
-  for (size_t r = f->extensions.signals; r < others; ++r) {
-    const extension_row* row = f->extensions.row + r;
-    if (row->effect->advance) {
-      row->effect->advance(row->place, row->parameters, &s->sample, row->memory, row->next);
+  const size_t count = f->extensions.frictions + f->extensions.torques;
+  effect_sample* sample = &f->scratch.sample;
+  *sample = sample_of_finger(f);
+  sample->first = is_first(f);
+  sample->time = time;
+  sample->step = step;
+  sample->angle = s->angle;
+  sample->velocity = s->velocity + f->joints * f->tendon_lanes;
+  sample->tendon_velocity = s->velocity;
+  sample->force = s->force;
+  for (const extension_row* row = f->extensions.friction; row < f->extensions.friction + count; ++row) {
+    if (row->action->advance) {
+      row->action->advance(row, sample);
     }
-    if (row->effect->slot && f->memory.elements) {
-      follow_elements(f, row, row->effect->size(row->place, row->parameters, &s->sample));
+    if (row->action->slot && f->memory.elements) {
+      follow_elements(f, row, row->action->size(row, sample));
     }
   }
 }
 
 effect_sample remembered_sample(const tendonfmu_finger* f) {
-  effect_sample sample = {.joints = f->joints,
-                          .tendons = f->tendons,
-                          .lanes = f->tendon_lanes,
-                          .first = f->remembered.scalar[STATE_FIRST_SAMPLE] != 0.0,
-                          .source = source_of(f),
-                          .time = f->remembered.scalar[STATE_TIME],
-                          .angle = f->remembered.angle,
-                          .velocity = f->remembered.speed,
-                          .force = f->remembered.force,
-                          .moment_arm = f->derived.moment_arm,
-                          .rest_angle = f->derived.cover_rest,
-                          .axis_cosine = f->derived.axis_cosine,
-                          .tendon_threshold = f->derived.settings.tendon_threshold,
-                          .joint_threshold = f->derived.settings.joint_threshold};
+  effect_sample sample = sample_of_finger(f);
+  sample.first = f->remembered.scalar[STATE_FIRST_SAMPLE] != 0.0;
+  sample.time = f->remembered.scalar[STATE_TIME];
+  sample.angle = f->remembered.angle;
+  sample.velocity = f->remembered.speed;
+  sample.force = f->remembered.force;
   return sample;
 }
 
@@ -150,22 +150,24 @@ void shape_signals(tendonfmu_finger* f, double time, int late) {
                             .velocity = s->velocity + f->joints * f->tendon_lanes,
                             .inverse_stiffness = f->derived.inverse_stiffness};
   for (size_t n = 0; n < f->extensions.signals; ++n) {
-    const extension_row* row = signal_row(f, n);
-    row->effect->signal(row->place, row->parameters, &signals, row->memory, row->next);
+    f->extensions.signal[n].action->signal(&f->extensions.signal[n], &signals);
   }
 }
 
 /* --- friction -------------------------------------------------------------------------------------------------------
  */
 
-size_t friction_members(const tendonfmu_finger* f, effect_place place) {
+/* how many velocities a friction row acts on: of a joint; of a tendon, one a joint; of all tendons, then of all joints
+ */
+static size_t count_members(const tendonfmu_finger* f, effect_place place) {
   if (place.joint != EFFECT_NOWHERE) {
     return 1;
   }
   return place.tendon != EFFECT_NOWHERE ? f->joints : f->joints * (f->tendons + 1);
 }
 
-size_t friction_slot(const tendonfmu_finger* f, effect_place place, size_t k) {
+/* the slot of one of them, as effect_action.grip() counts them */
+static size_t slot_of_member(const tendonfmu_finger* f, effect_place place, size_t k) {
   const size_t lanes = f->tendon_lanes;
   if (place.joint != EFFECT_NOWHERE) {
     return f->joints * lanes + place.joint;
@@ -176,66 +178,25 @@ size_t friction_slot(const tendonfmu_finger* f, effect_place place, size_t k) {
   return k < f->joints * f->tendons ? k / f->tendons * lanes + k % f->tendons : f->joints * (lanes - f->tendons) + k;
 }
 
-int friction_acts_on(const tendonfmu_finger* f, const extension_row* row, size_t slot, size_t* member) {
-  const size_t lanes = f->tendon_lanes, joint_row = f->joints * lanes;
-  const effect_place place = row->place;
-  *member = 0;
-  if (place.joint != EFFECT_NOWHERE) {
-    return slot == joint_row + place.joint;
-  }
-  if (place.tendon != EFFECT_NOWHERE) {
-    *member = slot / lanes;
-    return slot < joint_row && slot % lanes == place.tendon;
-  }
-  const int at_tendon = slot < joint_row;
-  *member = at_tendon ? slot / lanes * f->tendons + slot % lanes : f->joints * f->tendons + slot - joint_row;
-  return at_tendon ? slot % lanes < f->tendons : slot - joint_row < f->joints;
-}
-
-double slot_grip_of(const tendonfmu_finger* f, size_t slot) {
-  double value = 1.0;
-  for (size_t r = 0; r < f->extensions.friction; ++r) {
-    const extension_row* row = friction_row(f, r);
-    size_t member;
-    if (friction_acts_on(f, row, slot, &member)) {
-      value *= row->effect->grip(row->place, row->parameters, row->memory, member).value;
-    }
-  }
-  return value;
-}
-
-double slot_grip_slope(const tendonfmu_finger* f, size_t slot, double velocity) {
-  double value = 1.0, slope = 0.0;
-  for (size_t r = 0; r < f->extensions.friction; ++r) {
-    const extension_row* row = friction_row(f, r);
-    size_t member;
-    if (friction_acts_on(f, row, slot, &member)) {
-      const effect_grip own = row->effect->grip(row->place, row->parameters, row->memory, member);
-      slope = slope * own.value + value * own.by_velocity * velocity;
-      value *= own.value;
-    }
-  }
-  return slope;
-}
-
 static void grip_row(tendonfmu_finger* f, const extension_row* row) {
   const finger_scratch* s = &f->scratch;
-  const size_t members = friction_members(f, row->place);
+  const size_t members = count_members(f, row->place);
   for (size_t k = 0; k < members; ++k) {
-    const size_t slot = friction_slot(f, row->place, k);
-    const double value = row->effect->grip(row->place, row->parameters, row->next, k).value;
-    s->grip[slot] *= value;
-    s->bias_grip[slot] *= value;
+    const size_t slot = slot_of_member(f, row->place, k);
+    const effect_grip own = row->action->grip(row, k);
+    s->grip_slope[slot] = s->grip_slope[slot] * own.value + s->grip[slot] * own.by_velocity;
+    s->grip[slot] *= own.value;
+    s->bias_grip[slot] *= own.value;
   }
 }
 
 void find_grips(tendonfmu_finger* f) {
-  if (!f->extensions.friction) {
+  if (!f->extensions.frictions) {
     return;
   }
   clear_grips(f);
-  for (size_t r = 0; r < f->extensions.friction; ++r) {
-    grip_row(f, friction_row(f, r));
+  for (size_t r = 0; r < f->extensions.frictions; ++r) {
+    grip_row(f, f->extensions.friction + r);
   }
 }
 
@@ -257,7 +218,7 @@ void grip_jumps(tendonfmu_finger* f) {
 
 void add_extension_torques(tendonfmu_finger* f) {
   for (size_t r = 0; r < f->extensions.torques; ++r) {
-    const extension_row* row = torque_row(f, r);
-    row->effect->torque(row->place, row->parameters, &f->scratch.sample, row->next, f->scratch.friction);
+    const extension_row* row = f->extensions.torque + r;
+    row->action->torque(row, &f->scratch.sample, f->scratch.friction);
   }
 }

@@ -7,31 +7,6 @@
 /* Fills the table of rows and the cosines between the axes; whenever numbers were derived anew. */
 void find_extensions(tendonfmu_finger* finger);
 
-/* The n-th row of a part of the table. */
-static inline const extension_row* signal_row(const tendonfmu_finger* finger, size_t n) {
-  return finger->extensions.row + n;
-}
-static inline const extension_row* friction_row(const tendonfmu_finger* finger, size_t n) {
-  return finger->extensions.row + finger->extensions.signals + n;
-}
-static inline const extension_row* torque_row(const tendonfmu_finger* finger, size_t n) {
-  return finger->extensions.row + finger->extensions.signals + finger->extensions.friction + n;
-}
-
-/* Slots of a friction row: its member k, as effect_type.grip() counts it, acts on slot friction_slot(k),
- * k < friction_members(). A row everywhere has the slots of all tendons, then those of all joints. */
-size_t friction_members(const tendonfmu_finger* finger, effect_place place);
-size_t friction_slot(const tendonfmu_finger* finger, effect_place place, size_t k);
-
-/* Whether such a row acts on a slot, and which member it is there. */
-int friction_acts_on(const tendonfmu_finger* finger, const extension_row* row, size_t slot, size_t* member);
-
-/* The factor of all friction rows together at a slot, from the memory. */
-double slot_grip_of(const tendonfmu_finger* finger, size_t slot);
-
-/* Its derivative along a direction of the slot's velocity; what the effects remembered at the sample before is held. */
-double slot_grip_slope(const tendonfmu_finger* finger, size_t slot, double velocity);
-
 /* Side of the law of a slot that never sticks: 1 where it is the one for v < 0. */
 static inline int sliding_side(double velocity, double threshold, double side) {
   return velocity > threshold ? 0 : velocity < -threshold ? 1 : side < 0.0;
@@ -45,7 +20,7 @@ void shape_signals(tendonfmu_finger* finger, double time, int late);
 /* What friction and torque rows will remember; angles, velocities and forces are known. */
 void advance_extensions(tendonfmu_finger* finger, double time, double step);
 
-/* What the friction rows make of F at every slot, into scratch. */
+/* What the friction rows make of F at every slot, and how it varies with the velocity there, into scratch. */
 void find_grips(tendonfmu_finger* finger);
 
 /* b of every slot with a friction row, in scratch. */

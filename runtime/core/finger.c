@@ -11,7 +11,6 @@
 #include "kernel_choice.h"
 #include "message.h"
 #include "parameters.h"
-#include "sensor_fault.h"
 #include "step.h"
 
 #ifndef TENDONFMU_VERSION
@@ -160,15 +159,15 @@ size_t tendonfmu_tendon_count(const tendonfmu_finger* finger) {
 }
 
 int tendonfmu_has_links(const tendonfmu_finger* finger) {
-  return finger && (finger->shape.options & MODEL_HAS_LINKS) != 0;
+  return finger && has_option(finger, MODEL_HAS_LINKS);
 }
 
 int tendonfmu_watches_motors(const tendonfmu_finger* finger) {
-  return finger && (finger->shape.options & MODEL_WATCHES_MOTORS) != 0;
+  return finger && has_option(finger, MODEL_WATCHES_MOTORS);
 }
 
 int tendonfmu_watches_sensors(const tendonfmu_finger* finger) {
-  return finger && (finger->shape.options & MODEL_HAS_SENSOR_FAULT) != 0;
+  return finger && has_option(finger, MODEL_HAS_SENSOR_FAULT);
 }
 
 /* --- samples ------------------------------------------------------------------------------------------------------ */
@@ -198,28 +197,21 @@ tendonfmu_status tendonfmu_set_kinematics_source(tendonfmu_finger* finger, int s
     return fail(finger, TENDONFMU_WRONG_ORDER, "kinematics_source is fixed once the first sample is taken");
   }
   finger->remembered.scalar[STATE_SOURCE] = source;
-  recall_rows(finger); /* measured angles need none */
+  recall_sample(finger); /* measured angles need no rows */
   return TENDONFMU_OK;
 }
 
 static tendonfmu_status take(tendonfmu_finger* finger, double time, const tendonfmu_inputs* inputs) {
-  if (samples_take_inputs(finger, time, inputs, error_line(finger))) {
-    return TENDONFMU_BAD_SAMPLE;
+  const int taken = samples_take_inputs(finger, time, inputs, error_line(finger));
+  if (taken <= 0) {
+    return taken ? TENDONFMU_BAD_SAMPLE : TENDONFMU_OK;
   }
-  if (tendonfmu_is_initialised(finger) && time == finger->remembered.scalar[STATE_TIME]) {
-    return TENDONFMU_OK; /* the sample already taken */
+  if (take_sample(finger, time)) {
+    recall_sample(finger);
+    return fail(finger, TENDONFMU_BAD_SAMPLE,
+                "the sample at time %g s overflows: expected forces and velocities whose torques are finite", time);
   }
-  switch (take_sample(finger, time)) {
-    case SAMPLE_OUT_OF_RANGE: samples_name_bad_input(finger, time, inputs, error_line(finger)); break;
-    case SAMPLE_OVERFLOWS:
-      message_write(error_line(finger),
-                    "the sample at time %g s overflows: expected forces and velocities whose torques are finite", time);
-      recall_rows(finger);
-      forget_views(finger); /* they follow its velocities, which nothing else remembers */
-      break;
-    default: return TENDONFMU_OK;
-  }
-  return TENDONFMU_BAD_SAMPLE;
+  return TENDONFMU_OK;
 }
 
 static tendonfmu_status already_taken(const tendonfmu_finger* finger) {
@@ -305,7 +297,7 @@ tendonfmu_status tendonfmu_run_guided(tendonfmu_finger* finger, size_t samples, 
   if (!finger || !inputs || !guide || !outputs || (!time && samples)) {
     return missing(finger);
   }
-  if (finger->derived.settings.watches_sensors) {
+  if (has_option(finger, MODEL_HAS_SENSOR_FAULT)) {
     return fail(finger, TENDONFMU_BAD_ARGUMENT, "a guided run with sensor_fault: expected a finger without");
   }
   if (samples && tendonfmu_is_initialised(finger)) {
@@ -620,6 +612,6 @@ tendonfmu_status tendonfmu_set_kernel(tendonfmu_finger* finger, const char* name
                 "processor and build have it");
   }
   finger->kernel = kernel;
-  forget_views(finger); /* the kernels fill them by one or by four */
+  recall_sample(finger); /* the kernels fill views by one or by four */
   return TENDONFMU_OK;
 }

@@ -234,7 +234,7 @@ static size_t lay_out(const model_shape* shape, tendonfmu_finger* f, unsigned ch
   f->next_count = place_run(f, &c, next_rows, sizeof next_rows / sizeof next_rows[0], &f->next);
   lay_out_prepared(f, &c);
   place_rows(f, &c, other_rows, sizeof other_rows / sizeof other_rows[0]);
-  f->extensions.row = take(&c, f->shape.extension_count * sizeof(extension_row));
+  f->extensions.signal = take(&c, f->shape.extension_count * sizeof(extension_row));
   f->scratch.shares = take(&c, is_present(shape, WITH_BANDS) ? sizeof(band_shares) : 0);
   f->scratch.view = take(&c, f->slots / 4 * sizeof(slot_view));
   return c.used;

@@ -34,28 +34,17 @@ typedef struct finger_settings {
   double drift_variance, noise_std, noise_std_per_force, forget_rate;
   double initial_variance; /* < 0: from the noise at the first sample */
   double noise_time;       /* < 0: noise per sample */
-  int has_initial_torque, has_tendon_zero;
-  int forgets_by_absorption;
-  int has_bands, watches_motors, watches_sensors;
+  int has_initial_torque;
   double fault_hold_time, longest_stand, recovery_time; /* s */
   double force_resolution, jump_margin, spring_margin;  /* N */
   double position_resolution;                           /* m */
 } finger_settings;
 
-/* One row of the description's extensions. */
-typedef struct extension_row {
-  const effect_type* effect;
-  effect_place place;
-  const double* parameters;
-  double *memory, *next; /* as the last sample left it; as the present one will */
-  size_t memory_count;   /* of the effect itself */
-} extension_row;
-
-/* The rows by what they act on, each part in the description's order: signals, friction, torques, memory. */
+/* The rows by what they act on, those of each kind in the description's order; friction and torques side by side. */
 typedef struct extension_rows {
-  extension_row* row;
-  size_t signals, friction, torques, memory; /* how many of each */
-  int gripped;                               /* friction or memory rows: F at a slot is not what fig. 5 gives alone */
+  extension_row *signal, *friction, *torque, *memory;
+  size_t signals, frictions, torques, memories; /* how many of each */
+  int gripped; /* friction or memory rows: F at a slot is not what fig. 5 gives alone */
 } extension_rows;
 
 /* One of the elements side by side, by slot [n × M + N]; the edge and the pulley of a slot share its numbers. */
@@ -265,17 +254,18 @@ typedef struct finger_scratch {
   double* young;                     /* [N] of a mean that began with this joint's, instead of those in shares */
   band_shares* shares;               /* of the last step */
   /* with sensor_fault only */
-  sensor_memory sensor;     /* as in the state, after this sample */
-  double* inverse_routing;  /* [n × M] R⁺ of the rows in use */
-  double* leverage;         /* [M] h/(1 − h) of the rows in use; 0 of the others */
-  double* determined;       /* [M] 1: the others determine the angles */
-  double* row_in_use;       /* [M] 1 or 0; 0 where the angles are measured */
-  double* watch;            /* [N] as in the state, after this sample */
-  double* angle_shift;      /* [N] rad, by which the angles of the sample before change with the rows in use */
-  int angles_determined;    /* no row in use belongs to a failing sensor */
-  int unwell;               /* as in the state, after this sample */
-  double* extension;        /* the memory of the extensions after this sample */
-  double *grip, *bias_grip; /* [n × M + N] what friction rows make of F and b; with extensions only */
+  sensor_memory sensor;      /* as in the state, after this sample */
+  double* inverse_routing;   /* [n × M] R⁺ of the rows in use */
+  double* leverage;          /* [M] h/(1 − h) of the rows in use; 0 of the others */
+  double* determined;        /* [M] 1: the others determine the angles */
+  double* row_in_use;        /* [M] 1 or 0; 0 where the angles are measured */
+  double* watch;             /* [N] as in the state, after this sample */
+  double* angle_shift;       /* [N] rad, by which the angles of the sample before change with the rows in use */
+  int angles_determined;     /* no row in use belongs to a failing sensor */
+  int unwell;                /* as in the state, after this sample */
+  double* extension;         /* the memory of the extensions after this sample */
+  double *grip, *grip_slope; /* [n × M + N] what friction rows make of F and b, and ∂/∂v; with extensions only */
+  double* bias_grip;         /* [n × M + N] the same of b: 0 where nothing sticks */
   /* with a memory only */
   double* own_limit;                                 /* [N] N·m, what torque rows add to the limit of a joint */
   double* travelled;                                 /* [n × M + N] Δ */
@@ -320,6 +310,11 @@ static inline double sum_of_lanes(const double of[4]) {
   return (of[0] + of[2]) + (of[1] + of[3]);
 }
 
+/* Whether the description has any of these parts (MODEL_HAS_LINKS, …). */
+static inline int has_option(const tendonfmu_finger* finger, uint32_t options) {
+  return (finger->shape.options & options) != 0;
+}
+
 /* What a joint's bands remember. */
 static inline band_memory* bands_of(const tendonfmu_finger* finger, size_t joint) {
   return (band_memory*)(void*)finger->remembered.bands + joint;
@@ -332,7 +327,7 @@ static inline int is_first(const tendonfmu_finger* finger) {
 /* Angle of a joint at the sample before, by the rows that are in use now. */
 static inline double angle_before_step(const tendonfmu_finger* finger, size_t joint) {
   const double angle = finger->remembered.angle[joint];
-  return finger->derived.settings.watches_sensors ? angle + finger->scratch.angle_shift[joint] : angle;
+  return has_option(finger, MODEL_HAS_SENSOR_FAULT) ? angle + finger->scratch.angle_shift[joint] : angle;
 }
 
 /* Rows of lanes: four at once, for which no library is called. */
@@ -354,13 +349,19 @@ static inline int source_of(const tendonfmu_finger* finger) {
 }
 
 static inline int uses_positions(const tendonfmu_finger* finger) {
-  const finger_settings* settings = &finger->derived.settings;
-  return source_of(finger) == TENDONFMU_TENDON_POSITIONS || settings->watches_motors || settings->watches_sensors;
+  return source_of(finger) == TENDONFMU_TENDON_POSITIONS ||
+         has_option(finger, MODEL_WATCHES_MOTORS | MODEL_HAS_SENSOR_FAULT);
 }
 
 /* R⁺ as the kinematics use it */
 static inline const double* inverse_in_use(const tendonfmu_finger* finger) {
-  return finger->derived.settings.watches_sensors ? finger->scratch.inverse_routing : finger->derived.inverse_routing;
+  return has_option(finger, MODEL_HAS_SENSOR_FAULT) ? finger->scratch.inverse_routing : finger->derived.inverse_routing;
+}
+
+/* v_min of a slot: m/s, rad/s */
+static inline double threshold_of(const tendonfmu_finger* finger, size_t slot) {
+  const finger_settings* settings = &finger->derived.settings;
+  return slot < finger->joints * finger->tendon_lanes ? settings->tendon_threshold : settings->joint_threshold;
 }
 
 /* Side before the last sample of a slot that rested then, or rests now. */
@@ -369,13 +370,13 @@ static inline double side_before(const tendonfmu_finger* finger, size_t slot) {
   return event < 0.0 ? event + 2.0 : finger->remembered.side[slot];
 }
 
-/* Exponent of forgetting of a slot at the last sample: exp(−this) of what it brought along when it came to rest counted
- * when it began to move. */
-static inline double rest_exponent(const tendonfmu_finger* finger, size_t slot) {
+/* Exponent of forgetting of a slot: exp(−this) of what it brought along when it came to rest counts when it begins to
+ * move. absorbed: Λ until then. */
+static inline double rest_exponent(const tendonfmu_finger* finger, size_t slot, double absorbed) {
   const finger_state* s = &finger->remembered;
   const double since = s->stuck_since[slot];
-  return finger->derived.settings.forgets_by_absorption
-             ? s->scalar[STATE_ABSORBED_BEFORE] - since
+  return has_option(finger, MODEL_FORGETS_BY_ABSORPTION)
+             ? absorbed - since
              : finger->derived.settings.forget_rate * (s->last_stuck[slot] - since);
 }
 
@@ -400,8 +401,9 @@ void derive_numbers(tendonfmu_finger* finger, int routing_changed);
 /* Copies parameters and all that follows from them, of a finger of the same image. */
 void take_prepared_numbers(tendonfmu_finger* finger, const tendonfmu_finger* prepared);
 
-/* Makes the next sample look at all laws anew. */
-void forget_views(tendonfmu_finger* finger);
+/* What scratch keeps between samples, from the state: after parameters, state or kernel changed, or a sample was
+ * refused half way. The next sample looks at all laws anew. */
+void recall_sample(tendonfmu_finger* finger);
 
 /* --- the laws in force at a slot (derived_numbers.c): the side by the sign of its velocity, the working points by the
  * joint angle --- */
@@ -418,7 +420,10 @@ size_t slot_segment(const tendonfmu_finger* finger, size_t joint, size_t tendon,
 /* Laws of one effect: a single one, or those of the segment between two working points. */
 typedef struct effect_laws {
   const double *below, *above; /* above NULL: no working points */
-  double weight, weight_slope; /* of the one above, and along a direction of the angle */
+  dual weight;                 /* of the one above */
 } effect_laws;
 
-effect_laws edge_laws(const tendonfmu_finger* finger, size_t joint, size_t tendon, double angle, double angle_slope);
+effect_laws edge_laws(const tendonfmu_finger* finger, size_t joint, size_t tendon, dual angle);
+
+/* |F| of an effect at a speed >= 0, on its side for v > 0 or v < 0. */
+dual magnitude_at(const effect_laws* laws, int negative, dual speed);

@@ -12,6 +12,24 @@ enum { LAW_COULOMB, LAW_DROP, LAW_RATE, LAW_VISCOUS, LAW_SIDE_NUMBERS };
 
 enum { LAW_NUMBERS = 2 * LAW_SIDE_NUMBERS }; /* positive side, negative side */
 
+/* A number and its derivative along a direction. */
+typedef struct dual {
+  double value, slope;
+} dual;
+
+static inline dual product(dual a, dual b) {
+  return (dual){a.value * b.value, a.slope * b.value + a.value * b.slope};
+}
+static inline dual sum(dual a, dual b) {
+  return (dual){a.value + b.value, a.slope + b.slope};
+}
+static inline dual difference(dual a, dual b) {
+  return (dual){a.value - b.value, a.slope - b.slope};
+}
+static inline dual scaled(double factor, dual a) {
+  return (dual){factor * a.value, factor * a.slope};
+}
+
 /* One side at speed |v|, all for v > 0: mirror the value for v < 0. */
 typedef struct law_slopes {
   double value;    /* Fc + (Fs − Fc)·exp(−|v|/vs) + Fv·|v| */

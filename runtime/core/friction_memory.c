@@ -9,18 +9,14 @@
 #include "kernel_choice.h"
 
 /* Friction with a memory: numbers alone. */
-const effect_type effect_presliding = {PRESLIDING_FACTS, .kind = EFFECT_MEMORY};
-const effect_type effect_cord_stretch = {CORD_STRETCH_FACTS, .kind = EFFECT_MEMORY};
+const effect_action presliding_action = {.kind = EFFECT_MEMORY};
+const effect_action cord_stretch_action = {.kind = EFFECT_MEMORY};
 
 #define LEAST_DISTANCE 1e-150 /* m, rad: however short, no product in a step overflows */
 #define STEEPEST       1e290  /* 1/m, 1/rad, of z */
 
 /* numbers of a row of presliding, as in effects.json */
 enum { DISPLACEMENT, STIFFNESS, RELAXATION_TIME, SHARE };
-
-static const extension_row* memory_row(const tendonfmu_finger* f, size_t n) {
-  return f->extensions.row + f->extensions.signals + f->extensions.friction + f->extensions.torques + n;
-}
 
 /* how specific a row of presliding is at a slot; 0: it does not act there */
 static int rank_at(const tendonfmu_finger* f, effect_place place, size_t slot) {
@@ -55,8 +51,7 @@ static void set_element(tendonfmu_finger* f, size_t e, size_t slot, effect_place
   const friction_element* to = &f->memory.element[e];
   const size_t joint_row = f->joints * f->tendon_lanes;
   const int own = slot >= joint_row, everywhere = is_everywhere(place);
-  const double threshold = own ? f->derived.settings.joint_threshold : f->derived.settings.tendon_threshold;
-  const double distance = numbers[DISPLACEMENT] * (everywhere ? threshold : 1.0);
+  const double distance = numbers[DISPLACEMENT] * (everywhere ? threshold_of(f, slot) : 1.0);
   const double scale = own && everywhere ? mean_square_arm(f, slot - joint_row) : 1.0;
   const int absolute = numbers[STIFFNESS] > 0.0;
   to->share[slot] = numbers[SHARE];
@@ -72,9 +67,9 @@ static void find_elements(tendonfmu_finger* f, size_t slot) {
   size_t found = 0;
   int rank = 0;
   double sum = 0.0;
-  for (size_t r = 0; r < f->extensions.memory; ++r) {
-    const extension_row* row = memory_row(f, r);
-    const int here = turns && row->effect == &effect_presliding ? rank_at(f, row->place, slot) : 0;
+  for (size_t r = 0; r < f->extensions.memories; ++r) {
+    const extension_row* row = f->extensions.memory + r;
+    const int here = turns && row->action == &presliding_action ? rank_at(f, row->place, slot) : 0;
     if (here > rank) {
       rank = here;
       found = 0;
@@ -97,9 +92,9 @@ static void find_elements(tendonfmu_finger* f, size_t slot) {
 
 /* 1/k_c, m/N; 0: rigid */
 static double cord_compliance(const tendonfmu_finger* f) {
-  for (size_t r = 0; r < f->extensions.memory; ++r) {
-    const extension_row* row = memory_row(f, r);
-    if (row->effect == &effect_cord_stretch) {
+  for (size_t r = 0; r < f->extensions.memories; ++r) {
+    const extension_row* row = f->extensions.memory + r;
+    if (row->action == &cord_stretch_action) {
       return 1.0 / row->parameters[0];
     }
   }
@@ -190,26 +185,26 @@ void follow_elements(const tendonfmu_finger* f, const extension_row* row, double
   const size_t joint_row = f->joints * f->tendon_lanes;
   const friction_element* first = &f->memory.element[0];
   for (size_t k = 0; k < row->memory_count; ++k) {
-    const size_t slot = row->effect->slot(row->place, f->joints, f->tendon_lanes, k);
+    const size_t slot = row->action->slot(row, f->joints, f->tendon_lanes, k);
     if (f->memory.remembers[slot] == 0.0) {
       continue;
     }
     if (slot >= joint_row) {
       f->scratch.own_limit[slot - joint_row] += size;
-      row->next[k] = 0.0;
+      row->now[k] = 0.0;
       continue;
     }
-    const double travel = f->scratch.travelled[slot], z = first->kept[slot] * row->memory[k];
+    const double travel = f->scratch.travelled[slot], z = first->kept[slot] * row->before[k];
     const double gain =
         decayed_gain(first->relaxation_time[slot], f->scratch.sample.first ? 0.0 : f->scratch.sample.step);
     const double moved = travel == 0.0 ? z : z + gain * steepness(f, slot, size) * travel;
-    row->next[k] = moved > 1.0 ? 1.0 : moved < -1.0 ? -1.0 : moved;
+    row->now[k] = moved > 1.0 ? 1.0 : moved < -1.0 ? -1.0 : moved;
   }
 }
 
 double follower_slope(const tendonfmu_finger* f, const extension_row* row, size_t k, double size) {
-  const size_t slot = row->effect->slot(row->place, f->joints, f->tendon_lanes, k);
-  const double z = row->memory[k];
+  const size_t slot = row->action->slot(row, f->joints, f->tendon_lanes, k);
+  const double z = row->now[k];
   if (slot >= f->joints * f->tendon_lanes || f->memory.remembers[slot] == 0.0 || z >= 1.0 || z <= -1.0) {
     return 0.0;
   }

@@ -46,15 +46,9 @@ static void turn(rotation* frame, const double axis[3], double angle) {
   const double s = of.sine, c = of.cosine;
   const rotation before = *frame;
   for (int k = 0; k < 3; ++k) {
-    const double across[3] = {k == 0   ? 0.0
-                              : k == 1 ? -axis[2]
-                                       : axis[1],
-                              k == 1   ? 0.0
-                              : k == 2 ? -axis[0]
-                                       : axis[2],
-                              k == 2   ? 0.0
-                              : k == 0 ? -axis[1]
-                                       : axis[0]}; /* axis × e_k */
+    const double unit[3] = {k == 0, k == 1, k == 2};
+    double across[3];
+    cross(axis, unit, across);
     double turned[3];
     for (int i = 0; i < 3; ++i) {
       turned[i] = (i == k ? c : 0.0) + (1.0 - c) * axis[k] * axis[i] + s * across[i];

@@ -16,69 +16,63 @@ uint32_t model_law_count(law_kind kind) {
 
 typedef struct walk {
   const model_shape* shape;
-  int (*visit)(void* context, const model_item* item);
+  int (*visit)(void* context, const model_item* item); /* NULL: only count */
   void* context;
-  uint32_t next; /* parameter index */
+  model_item item; /* what the next ones have in common */
+  uint32_t next;   /* parameter index */
   int result;
 } walk;
 
 /* passes on one item unless it has no numbers or an earlier visit has ended the walk */
-static void emit(walk* w, model_item item, uint32_t count) {
-  item.first = w->next;
-  item.count = count;
+static void emit(walk* w, model_item_kind kind, uint32_t count) {
+  w->item.kind = kind;
+  w->item.first = w->next;
+  w->item.count = count;
   w->next += count;
-  if (count && w->result == 0) {
-    w->result = w->visit(w->context, &item);
+  if (count && w->visit && w->result == 0) {
+    w->result = w->visit(w->context, &w->item);
   }
 }
 
-static void emit_law(walk* w, model_item item, uint32_t kind) {
-  item.law = (law_kind)kind;
-  emit(w, item, model_law_count(item.law));
+static void emit_law(walk* w, model_item_kind kind, uint32_t law) {
+  w->item.law = (law_kind)law;
+  emit(w, kind, model_law_count(w->item.law));
+  w->item.law = LAW_ABSENT;
 }
 
-static void walk_joints(walk* w) {
-  for (uint32_t j = 0; j < w->shape->joints; ++j) {
-    const uint32_t word = w->shape->words[j];
-    emit(w, (model_item){.kind = ITEM_COVER, .joint = j}, word & 1 ? 2 : 0);
-    emit_law(w, (model_item){.kind = ITEM_JOINT_FRICTION, .joint = j}, word >> 1 & 3);
-    emit_law(w, (model_item){.kind = ITEM_LOAD_FRICTION, .joint = j}, word >> 3 & 3);
+static void walk_joint(walk* w, uint32_t joint) {
+  const uint32_t word = w->shape->words[joint];
+  w->item = (model_item){.joint = joint};
+  emit(w, ITEM_COVER, word & 1 ? 2 : 0);
+  emit_law(w, ITEM_JOINT_FRICTION, word >> 1 & 3);
+  emit_law(w, ITEM_LOAD_FRICTION, word >> 3 & 3);
+}
+
+static const uint32_t* walk_edge(walk* w, const uint32_t* word) {
+  model_item* item = &w->item;
+  const uint32_t points = *word & ~MODEL_EDGE_HAS_ANGLES;
+  item->has_angles = (*word++ & MODEL_EDGE_HAS_ANGLES) != 0;
+  emit(w, ITEM_EDGE_ANGLES, item->has_angles ? points : 0);
+  for (item->point = 0; item->point < points; ++item->point) {
+    emit_law(w, ITEM_EDGE_FRICTION, *word++);
   }
+  item->point = 0;
+  return word;
 }
 
 static const uint32_t* walk_tendon(walk* w, uint32_t tendon, const uint32_t* word) {
   const uint32_t n = w->shape->joints;
-  emit(w, (model_item){.kind = ITEM_STIFFNESS, .tendon = tendon}, 1);
-  emit(w, (model_item){.kind = ITEM_MOMENT_ARMS, .tendon = tendon}, n);
-  emit(w, (model_item){.kind = ITEM_TENDON_ZERO, .tendon = tendon}, w->shape->options & MODEL_HAS_TENDON_ZERO ? 1 : 0);
-  ++word; /* flags */
-  for (uint32_t j = 0; j < n; ++j) {
-    emit_law(w, (model_item){.kind = ITEM_PULLEY_FRICTION, .tendon = tendon, .joint = j}, *word++);
+  w->item = (model_item){.tendon = tendon, .bidirectional = *word++ & 1};
+  emit(w, ITEM_STIFFNESS, 1);
+  emit(w, ITEM_MOMENT_ARMS, n);
+  emit(w, ITEM_TENDON_ZERO, w->shape->options & MODEL_HAS_TENDON_ZERO ? 1 : 0);
+  for (w->item.joint = 0; w->item.joint < n; ++w->item.joint) {
+    emit_law(w, ITEM_PULLEY_FRICTION, *word++);
   }
-  for (uint32_t j = 0; j < n; ++j) {
-    const uint32_t points = *word & ~MODEL_EDGE_HAS_ANGLES;
-    const int has_angles = (*word++ & MODEL_EDGE_HAS_ANGLES) != 0;
-    model_item item = {.kind = ITEM_EDGE_ANGLES, .tendon = tendon, .joint = j, .has_angles = has_angles};
-    emit(w, item, has_angles ? points : 0);
-    item.kind = ITEM_EDGE_FRICTION;
-    for (item.point = 0; item.point < points; ++item.point) {
-      emit_law(w, item, *word++);
-    }
+  for (w->item.joint = 0; w->item.joint < n; ++w->item.joint) {
+    word = walk_edge(w, word);
   }
   return word;
-}
-
-static void walk_bands(walk* w, model_item_kind kind, uint32_t count) {
-  for (uint32_t k = 0; count && k < MODEL_MAX_BANDS; ++k) {
-    emit(w, (model_item){.kind = kind, .point = k}, count);
-  }
-}
-
-static void walk_links(walk* w, uint32_t count) {
-  for (uint32_t j = 0; j < w->shape->joints; ++j) {
-    emit(w, (model_item){.kind = ITEM_LINK_AXIS, .joint = j}, count);
-    emit(w, (model_item){.kind = ITEM_LINK_OFFSET, .joint = j}, count);
-  }
 }
 
 /* numbers of an item of the finger as a whole; 0 where the description has none */
@@ -95,14 +89,21 @@ static uint32_t count_of(const model_shape* shape, model_item_kind kind) {
 }
 
 static void walk_finger(walk* w) {
-  for (int kind = ITEM_EDGE_FRICTION + 1; kind < ITEM_EXTENSION; ++kind) {
-    const uint32_t count = count_of(w->shape, (model_item_kind)kind);
+  model_item* item = &w->item;
+  for (model_item_kind kind = ITEM_EDGE_FRICTION + 1; kind < ITEM_EXTENSION; ++kind) {
+    const uint32_t count = count_of(w->shape, kind);
+    *item = (model_item){.kind = kind};
     if (kind >= ITEM_BAND_NOISE && kind <= ITEM_BAND_FRICTION_RESERVE) {
-      walk_bands(w, (model_item_kind)kind, count);
-    } else if (kind == ITEM_LINK_AXIS) {
-      walk_links(w, count); /* the offsets with them */
+      for (; item->point < MODEL_MAX_BANDS; ++item->point) {
+        emit(w, kind, count);
+      }
+    } else if (kind == ITEM_LINK_AXIS) { /* the offsets with them */
+      for (; item->joint < w->shape->joints; ++item->joint) {
+        emit(w, ITEM_LINK_AXIS, count);
+        emit(w, ITEM_LINK_OFFSET, count);
+      }
     } else if (kind != ITEM_LINK_OFFSET) {
-      emit(w, (model_item){.kind = (model_item_kind)kind}, count);
+      emit(w, kind, count);
     }
   }
 }
@@ -117,45 +118,40 @@ effect_place model_extension_place(const model_shape* shape, uint32_t index) {
 }
 
 size_t model_extension_memory(const effect_type* effect, const model_shape* shape, effect_place place) {
-  return effect->state_count ? effect->state_count(shape->joints, shape->tendons, place) : effect->memory_count;
+  const effect_action* action = effect->action;
+  return action->state_count ? action->state_count(shape->joints, shape->tendons, place) : action->memory_count;
 }
 
-static void walk_extensions(walk* w) {
-  for (uint32_t i = 0; i < w->shape->extension_count; ++i) {
-    const uint32_t* row = w->shape->extensions + i * MODEL_EXTENSION_WORDS;
-    const effect_type* effect = effect_by_id(row[0]);
-    emit(w,
-         (model_item){
-             .kind = ITEM_EXTENSION, .extension = i, .effect = effect, .place = model_extension_place(w->shape, i)},
-         effect->parameter_count);
-  }
+static void walk_extension(walk* w, uint32_t index) {
+  const effect_type* effect = effect_by_id(w->shape->extensions[(size_t)index * MODEL_EXTENSION_WORDS]);
+  w->item = (model_item){.extension = index, .effect = effect, .place = model_extension_place(w->shape, index)};
+  emit(w, ITEM_EXTENSION, effect->parameter_count);
 }
 
 static uint32_t run_walk(walk* w) {
-  const uint32_t* word = w->shape->words + w->shape->joints;
-  walk_joints(w);
-  for (uint32_t i = 0; i < w->shape->tendons; ++i) {
+  const model_shape* shape = w->shape;
+  const uint32_t* word = shape->words + shape->joints;
+  for (uint32_t j = 0; j < shape->joints; ++j) {
+    walk_joint(w, j);
+  }
+  for (uint32_t i = 0; i < shape->tendons; ++i) {
     word = walk_tendon(w, i, word);
   }
   walk_finger(w);
-  walk_extensions(w);
+  for (uint32_t i = 0; i < shape->extension_count; ++i) {
+    walk_extension(w, i);
+  }
   return w->next;
 }
 
 int model_visit(const model_shape* shape, int (*visit)(void* context, const model_item* item), void* context) {
-  walk w = {shape, visit, context, 0, 0};
+  walk w = {.shape = shape, .visit = visit, .context = context};
   run_walk(&w);
   return w.result;
 }
 
-static int visit_nothing(void* context, const model_item* item) {
-  (void)context;
-  (void)item;
-  return 0;
-}
-
 uint32_t model_count_parameters(const model_shape* shape) {
-  walk w = {shape, visit_nothing, NULL, 0, 0};
+  walk w = {.shape = shape};
   return run_walk(&w);
 }
 
@@ -173,12 +169,6 @@ static uint64_t unpadded_size(const model_shape* shape) {
 
 static uint64_t values_offset(const model_shape* shape) {
   return (unpadded_size(shape) + 7u) & ~(uint64_t)7u;
-}
-
-/* −1 where one option needs another that is missing */
-static int check_options(const model_shape* shape) {
-  const uint32_t both = MODEL_DETECTS_BY_BANDS | MODEL_WATCHES_MOTORS;
-  return (shape->options & both) == MODEL_WATCHES_MOTORS ? -1 : 0;
 }
 
 static int read_counts(const void* image, size_t image_size, model_shape* shape, message_line message) {
@@ -216,7 +206,7 @@ static int read_counts(const void* image, size_t image_size, model_shape* shape,
   if (shape->options & ~(uint32_t)MODEL_OPTION_BITS) {
     return refuse_value(message, "model image: option bits", shape->options, "a sum of known ones");
   }
-  if (check_options(shape)) {
+  if ((shape->options & (MODEL_DETECTS_BY_BANDS | MODEL_WATCHES_MOTORS)) == MODEL_WATCHES_MOTORS) {
     return refuse_value(message, "model image: option bits", shape->options, "ones that go together");
   }
   if (values_offset(shape) + 8u * (uint64_t)shape->parameter_count != image_size) {
@@ -342,10 +332,10 @@ static int check_extension(const unsigned char* table, uint32_t i, model_shape* 
   if (same > (uint32_t)effect->most) {
     return message_write(message, "model image with more extensions of one effect at a place than that may have");
   }
-  if (effect == &effect_presliding && same > shape->elements) {
+  if (effect->action == &presliding_action && same > shape->elements) {
     shape->elements = same;
   }
-  shape->stretches |= effect == &effect_cord_stretch;
+  shape->stretches |= effect->action == &cord_stretch_action;
   shape->extension_memory += model_extension_memory(effect, shape, stored_place(row));
   return 0;
 }

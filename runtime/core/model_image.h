@@ -61,6 +61,7 @@ typedef struct model_item {
   uint32_t tendon;       /* 0-based */
   uint32_t point;        /* working point or band, 0-based */
   int has_angles;        /* the edge is a list of working points */
+  int bidirectional;     /* the tendon; of its stiffness */
   law_kind law;          /* of laws */
   uint32_t extension;    /* 0-based */
   effect_place place;    /* of an extension */

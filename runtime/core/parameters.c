@@ -139,7 +139,6 @@ int parameter_check_value(const model_item* item, uint32_t index, double value, 
 typedef struct check {
   const double* values;
   message_line message;
-  const model_shape* shape;
   model_item threshold; /* of the two velocity thresholds one that is 0; count 0: none */
 } check;
 
@@ -250,7 +249,7 @@ static int collect_arms(void* context, const model_item* item) {
 }
 
 int parameter_check_relations(const model_shape* shape, const double* values, message_line message) {
-  check c = {.values = values, .message = message, .shape = shape};
+  check c = {.values = values, .message = message};
   return model_visit(shape, check_relation, &c);
 }
 
@@ -267,7 +266,7 @@ int parameter_check_routing(const model_shape* shape, const double* values, mess
 }
 
 int parameter_check_all(const model_shape* shape, const double* values, message_line message) {
-  check c = {.values = values, .message = message, .shape = shape};
+  check c = {.values = values, .message = message};
   if (model_visit(shape, check_range, &c)) {
     return -1;
   }

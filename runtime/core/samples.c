@@ -49,6 +49,26 @@ static int check_time(const tendonfmu_finger* f, double time, message_line messa
   return initialised ? message_add(message, ", not before the sample already taken at %g s", before) : -1;
 }
 
+/* NaN is out of range; four at once, with the spare lanes behind */
+static int is_in_range(const input_row* row) {
+  int inside = 1;
+  for (size_t i = 0; i < row->count; i += 4) {
+    for (size_t lane = i; lane < i + 4; ++lane) {
+      inside &= fabs(row->to[lane]) <= LARGEST_INPUT;
+    }
+  }
+  return inside;
+}
+
+static int refuse_input(const input_row* row, double time, message_line message) {
+  size_t i = 0;
+  while (i + 1 < row->count && fabs(row->to[i]) <= LARGEST_INPUT) {
+    ++i;
+  }
+  return message_write(message, "%s[%zu] = %g at time %g s: expected a finite number of magnitude at most 1e+12 %s",
+                       row->name, i + 1, row->to[i], time, row->unit);
+}
+
 int samples_take_inputs(tendonfmu_finger* finger, double time, const tendonfmu_inputs* inputs, message_line message) {
   input_row rows[MOST_ROWS];
   const size_t count = used_rows(finger, inputs, rows);
@@ -61,25 +81,17 @@ int samples_take_inputs(tendonfmu_finger* finger, double time, const tendonfmu_i
                            "%s is missing: this kinematics source, or contact.watches_motors or sensor_fault, needs it",
                            rows[k].name);
     }
-    memcpy(rows[k].to, rows[k].values, rows[k].count * sizeof(double));
   }
-  return 0;
-}
-
-void samples_name_bad_input(const tendonfmu_finger* finger, double time, const tendonfmu_inputs* inputs,
-                            message_line message) {
-  input_row rows[MOST_ROWS];
-  const size_t count = used_rows(finger, inputs, rows);
+  if (!is_first(finger) && time == finger->remembered.scalar[STATE_TIME]) {
+    return 0;
+  }
   for (size_t k = 0; k < count; ++k) {
-    for (size_t i = 0; i < rows[k].count; ++i) {
-      const double value = rows[k].values[i];
-      if (!(fabs(value) <= LARGEST_INPUT)) {
-        message_write(message, "%s[%zu] = %g at time %g s: expected a finite number of magnitude at most 1e+12 %s",
-                      rows[k].name, i + 1, value, time, rows[k].unit);
-        return;
-      }
+    memcpy(rows[k].to, rows[k].values, rows[k].count * sizeof(double));
+    if (!is_in_range(&rows[k])) {
+      return refuse_input(&rows[k], time, message);
     }
   }
+  return 1;
 }
 
 static void give_numbers(double* to, const double* from, size_t count, size_t row) {
@@ -104,7 +116,7 @@ static void give_deviations(double* to, const double* variance, size_t count, si
 static void give_terms(double* to, const tendonfmu_finger* f, size_t row) {
   for (size_t j = 0; to && j < f->joints; ++j) {
     _Alignas(32) double terms[BAND_TERMS * BANDS] = {0.0};
-    if (f->derived.settings.has_bands) {
+    if (has_option(f, MODEL_DETECTS_BY_BANDS)) {
       size_t band;
       f->kernel->weigh_bands(bands_of(f, j), f->derived.band_square + j * BANDS * BAND_NUMBERS, terms, &band);
     }

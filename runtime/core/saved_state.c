@@ -7,7 +7,6 @@
 
 #include "bytes.h"
 #include "parameters.h"
-#include "sensor_fault.h"
 
 enum { HEADER_BYTES = 40, HASHED_FROM = 32, STATE_VERSION = 4 };
 
@@ -65,7 +64,7 @@ static int rows_are_sound(const tendonfmu_finger* f, const unsigned char* state)
       }
     }
   }
-  return f->derived.settings.watches_sensors || load_f64(state + 8 * STATE_UNWELL) == 0.0;
+  return has_option(f, MODEL_HAS_SENSOR_FAULT) || load_f64(state + 8 * STATE_UNWELL) == 0.0;
 }
 
 /* where a row of the finger stands in a saved state */
@@ -76,7 +75,7 @@ static const unsigned char* saved_row(const tendonfmu_finger* f, const unsigned 
 /* times that may not lie ahead */
 static int bands_are_sound(const tendonfmu_finger* f, const unsigned char* state) {
   const double time = load_f64(state + 8 * STATE_TIME);
-  for (size_t j = 0; f->derived.settings.has_bands && j < f->joints; ++j) {
+  for (size_t j = 0; has_option(f, MODEL_DETECTS_BY_BANDS) && j < f->joints; ++j) {
     band_memory joint;
     const unsigned char* from = saved_row(f, state, (const double*)(const void*)bands_of(f, j));
     load_doubles((double*)(void*)&joint, from, sizeof joint / sizeof(double));
@@ -89,7 +88,7 @@ static int bands_are_sound(const tendonfmu_finger* f, const unsigned char* state
 
 /* nothing has rested for less than no time: exponents of forgetting are not negative */
 static int rests_are_sound(const tendonfmu_finger* f, const unsigned char* state) {
-  const int absorbs = f->derived.settings.forgets_by_absorption;
+  const int absorbs = has_option(f, MODEL_FORGETS_BY_ABSORPTION);
   const double absorbed = load_f64(state + 8 * STATE_ABSORBED_BEFORE);
   if (load_f64(state + 8 * STATE_ABSORBED) < absorbed) {
     return 0;
@@ -135,7 +134,6 @@ int restore_state(tendonfmu_finger* finger, const void* bytes, message_line mess
     memcpy(finger->parameters, finger->candidate, p * sizeof(double));
     derive_numbers(finger, 1);
   }
-  recall_rows(finger);
-  forget_views(finger); /* they follow the side of the last moving sample, which is another one now */
+  recall_sample(finger);
   return 0;
 }

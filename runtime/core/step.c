@@ -9,30 +9,6 @@
 #include "kernel_choice.h"
 #include "sensor_fault.h"
 
-/* --- inputs ---------------------------------------------------------------------------------------------------------
- */
-
-/* NaN is out of range */
-static int row_in_range(const double* row, size_t lanes) {
-  int inside = 1;
-  for (size_t i = 0; i < lanes; i += 4) {
-    for (size_t lane = i; lane < i + 4; ++lane) {
-      inside &= fabs(row[lane]) <= LARGEST_INPUT;
-    }
-  }
-  return inside;
-}
-
-static int inputs_in_range(const tendonfmu_finger* f) {
-  const finger_scratch* s = &f->scratch;
-  const int source = source_of(f);
-  const double* velocity = s->velocity + f->joints * f->tendon_lanes;
-  return row_in_range(s->force, f->tendon_lanes) &&
-         (!uses_positions(f) || row_in_range(s->position, f->tendon_lanes)) &&
-         (source == TENDONFMU_TENDON_POSITIONS || row_in_range(s->angle, f->joint_lanes)) &&
-         (source != TENDONFMU_JOINT_VELOCITIES || row_in_range(velocity, f->joint_lanes));
-}
-
 /* --- kinematics -----------------------------------------------------------------------------------------------------
  */
 
@@ -92,7 +68,7 @@ static void measured_torques(tendonfmu_finger* f) {
 
 /* mean |f0| over the tendons */
 static double mean_tendon_force(const tendonfmu_finger* f) {
-  if (f->derived.settings.watches_sensors && f->scratch.unwell) {
+  if (has_option(f, MODEL_HAS_SENSOR_FAULT) && f->scratch.unwell) {
     return mean_sound_force(f);
   }
   double sums[4] = {0.0};
@@ -118,12 +94,12 @@ static int all_finite(const tendonfmu_finger* f) {
   double probe = extension_probe(f);
   for (size_t j = 0; j < f->joints; ++j) {
     double sum = fabs(s->torque[j]) + fabs(s->friction[j]) + (fabs(s->bias_step[j]) + fabs(f->remembered.bias[j]));
-    if (f->derived.settings.has_bands) {
+    if (has_option(f, MODEL_DETECTS_BY_BANDS)) {
       sum += fabs(s->motor_load[j]) + s->limit[j] + fabs(f->remembered.jumped[j]);
     }
     probe += 0.0 * (1e160 * sum) + (0.0 * s->angle[j] + 0.0 * velocity[j]); /* infinite above 1.8e148 */
   }
-  for (size_t i = 0; f->derived.settings.watches_sensors && i < f->tendons; ++i) {
+  for (size_t i = 0; has_option(f, MODEL_HAS_SENSOR_FAULT) && i < f->tendons; ++i) {
     probe += 0.0 * (1e30 * s->sensor.joint_side[i]); /* nor the force of a spring there */
   }
   return probe == 0.0;
@@ -162,7 +138,7 @@ static void begin_tracking(tendonfmu_finger* f, double time, double mean_force) 
   for (size_t slot = 0; slot < f->slots; ++slot) {
     s->event[slot] = 0.0;
     s->last_stuck[slot] = time;
-    s->stuck_since[slot] = f->derived.settings.forgets_by_absorption ? 0.0 : time;
+    s->stuck_since[slot] = has_option(f, MODEL_FORGETS_BY_ABSORPTION) ? 0.0 : time;
   }
   clear_lanes(s->joint_contact, f->joint_lanes);
   begin_detection(f, time);
@@ -175,7 +151,7 @@ static void jump_bias(tendonfmu_finger* f) {
   const finger_state* s = &f->remembered;
   for (size_t j = 0; j < f->joint_lanes; ++j) {
     s->bias[j] += f->scratch.bias_step[j];
-    if (f->derived.settings.has_bands) {
+    if (has_option(f, MODEL_DETECTS_BY_BANDS)) {
       s->jumped[j] += f->scratch.bias_step[j];
     }
   }
@@ -205,7 +181,7 @@ static void track_guided(tendonfmu_finger* f, double step, double mean_force) {
 
 /* steps 4 to 6 (docs/reference/semantics/README.md#order-of-the-steps) for every later sample */
 static void track_sample(tendonfmu_finger* f, double time, double step, double mean_force) {
-  const int unwell = f->derived.settings.watches_sensors && f->scratch.unwell;
+  const int unwell = has_option(f, MODEL_HAS_SENSOR_FAULT) && f->scratch.unwell;
   jump_bias(f);
   if (unwell) {
     begin_bias_anew(f);
@@ -244,24 +220,21 @@ static int find_torques(tendonfmu_finger* f) {
   return transitions;
 }
 
-sample_result take_sample(tendonfmu_finger* f, double time) {
+int take_sample(tendonfmu_finger* f, double time) {
   const finger_state* s = &f->remembered;
   const int first = is_first(f);
   const double step = time - s->scalar[STATE_TIME];
 
-  if (!inputs_in_range(f)) {
-    return SAMPLE_OUT_OF_RANGE;
-  }
-  for (size_t i = 0; f->derived.settings.has_tendon_zero && uses_positions(f) && i < f->tendons; ++i) {
+  for (size_t i = 0; has_option(f, MODEL_HAS_TENDON_ZERO) && uses_positions(f) && i < f->tendons; ++i) {
     f->scratch.position[i] -= f->derived.tendon_zero[i];
   }
-  if (f->derived.settings.watches_motors) { /* x: the load that the motors drive, as if the joints stood */
+  if (has_option(f, MODEL_WATCHES_MOTORS)) { /* x: the load that the motors drive, as if the joints stood */
     f->kernel->multiply(f, f->derived.load_arm, f->scratch.position, f->scratch.motor_load);
   }
   if (f->extensions.signals) {
     shape_signals(f, time, 0);
   }
-  if (f->derived.settings.watches_sensors) {
+  if (has_option(f, MODEL_HAS_SENSOR_FAULT)) {
     watch_sensors(f, time, first ? 0.0 : step);
   }
   const double velocity_gain = find_kinematics(f, time, step);
@@ -274,7 +247,7 @@ sample_result take_sample(tendonfmu_finger* f, double time) {
   const int transitions = find_torques(f);
   const double mean_force = mean_tendon_force(f);
   if (!all_finite(f)) {
-    return SAMPLE_OVERFLOWS;
+    return -1;
   }
 
   remember_sample(f, time, velocity_gain, transitions);
@@ -293,5 +266,5 @@ sample_result take_sample(tendonfmu_finger* f, double time) {
     s->compensated[j] = s->torque[j] - s->friction[j];
   }
   estimate_variance(f, mean_force);
-  return SAMPLE_TAKEN;
+  return 0;
 }

@@ -5,20 +5,14 @@
 #include "finger_memory.h"
 #include "message.h"
 
-typedef enum sample_result { SAMPLE_TAKEN, SAMPLE_OUT_OF_RANGE, SAMPLE_OVERFLOWS } sample_result;
-
-/* Takes the sample whose inputs stand in scratch; unless SAMPLE_TAKEN is returned, nothing is remembered. */
-sample_result take_sample(tendonfmu_finger* finger, double time);
+/* Takes the sample whose inputs stand in scratch. Returns 0, or −1 where it overflows and nothing is remembered. */
+int take_sample(tendonfmu_finger* finger, double time);
 
 /* --- inputs and outputs ------------------------------------------------------------------------------------------- */
 
-/* Checks the time and copies the inputs that the kinematics source uses into scratch; their values are left to the
- * kernel. Returns 0, or −1 with one line in message. */
+/* Checks the time and copies the inputs that the kinematics source uses into scratch. Returns 1; 0 where the sample at
+ * this time is already taken; or −1 with one line in message. */
 int samples_take_inputs(tendonfmu_finger* finger, double time, const tendonfmu_inputs* inputs, message_line message);
-
-/* Says in message which input is out of range, after the kernel refused them. */
-void samples_name_bad_input(const tendonfmu_finger* finger, double time, const tendonfmu_inputs* inputs,
-                            message_line message);
 
 /* Copies the outputs of the last sample into row `row` of the caller's arrays. */
 void samples_give_outputs(const tendonfmu_finger* finger, const tendonfmu_outputs* wanted, size_t row);
@@ -31,8 +25,8 @@ tendonfmu_inputs samples_row(const tendonfmu_finger* finger, const tendonfmu_inp
 
 /* --- the derivative of the last sample ---------------------------------------------------------------------------- */
 
-/* direction and derivative as in tendonfmu.h; the finger is initialised and nothing in it changes. */
-void directional_derivative(const tendonfmu_finger* finger, const tendonfmu_inputs* direction,
+/* direction and derivative as in tendonfmu.h; the finger is initialised and nothing in it changes but scratch. */
+void directional_derivative(tendonfmu_finger* finger, const tendonfmu_inputs* direction,
                             const tendonfmu_outputs* derivative);
 
 /* --- saved states ------------------------------------------------------------------------------------------------- */

@@ -89,7 +89,7 @@ bool sample_rows::remembers(std::size_t slot) const {
 
 /* what friction rows make of a slot */
 double sample_rows::grip(const double* grips, std::size_t slot) const {
-  return finger_->extensions.friction > 0 ? grips[slot] : 1.0;
+  return finger_->extensions.frictions > 0 ? grips[slot] : 1.0;
 }
 
 sample_rows::friction_place sample_rows::edge_at(std::size_t tendon, std::size_t joint) const {
@@ -213,7 +213,8 @@ double sample_rows::read_jump(const friction_place& p) {
     add(before, 1.0);
     return jump;
   }
-  const double kept = before == 0.0 ? 0.0 : law_exponential(rest_exponent(finger_, p.slot));
+  const double kept =
+      before == 0.0 ? 0.0 : law_exponential(rest_exponent(finger_, p.slot, s.scalar[STATE_ABSORBED_BEFORE]));
   add(now, kept - 1.0);
   if (kept != 0.0) {
     add(before, -kept);

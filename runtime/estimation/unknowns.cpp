@@ -194,7 +194,7 @@ class column_maker {
       const model_item item = parameter_item(&s_.finger->shape, p);
       /* torques are linear in their numbers; what turns friction or the signals is not */
       unknown->curved = unknown->curved || unknown->role == unknown_role::rate ||
-                        (item.kind == ITEM_EXTENSION && item.effect->kind != EFFECT_TORQUE);
+                        (item.kind == ITEM_EXTENSION && item.effect->action->kind != EFFECT_TORQUE);
     }
     unknown->scale = scale > 0.0 ? scale : neighbours_scale(column);
     bound(unknown);

@@ -61,12 +61,13 @@ struct Effect {
       : type(effect_of(name)),
         place{joint ? joint - 1 : EFFECT_NOWHERE, tendon ? tendon - 1 : EFFECT_NOWHERE, EFFECT_NOWHERE},
         numbers(std::move(values)) {
-    memory.resize(type->state_count ? type->state_count(joints, tendons, place) : type->memory_count, 0.0);
+    const effect_action& acts = *type->action;
+    memory.resize(acts.state_count ? acts.state_count(joints, tendons, place) : acts.memory_count, 0.0);
   }
 
-  // Calls with the sample as an effect sees it.
+  // Calls with the sample as an effect sees it, and its row with what it remembers after it.
   template <class Call>
-  static void see(const Sample& sample, Call call) {
+  void see(const Sample& sample, std::vector<double> after, Call call) const {
     const auto velocity = sample.tendon_velocity();
     effect_sample seen{};
     seen.joints = joints;
@@ -85,13 +86,17 @@ struct Effect {
     seen.axis_cosine = sample.cosine.data();
     seen.tendon_threshold = 0.0005;
     seen.joint_threshold = 0.01;
-    call(&seen);
+    const extension_row row = {type->action, place, numbers.data(), memory.data(), after.data(), memory.size()};
+    call(&row, &seen);
   }
 
   std::vector<double> advanced(const Sample& sample) const {
     std::vector<double> after(memory.size(), std::numeric_limits<double>::quiet_NaN());
-    if (type->advance) {
-      see(sample, [&](auto* seen) { type->advance(place, numbers.data(), seen, memory.data(), after.data()); });
+    if (type->action->advance) {
+      see(sample, after, [&](auto* row, auto* seen) {
+        type->action->advance(row, seen);
+        after.assign(row->now, row->now + row->memory_count);
+      });
     }
     return after;
   }
@@ -104,23 +109,23 @@ struct Effect {
     return along;
   }
 
-  PerJoint torque(const Sample& sample, const std::vector<double>& parameters, const std::vector<double>& after) const {
+  PerJoint torque(const Sample& sample, const std::vector<double>& after) const {
     PerJoint result{1.0, 2.0, 3.0};  // it adds
-    see(sample, [&](auto* seen) { type->torque(place, parameters.data(), seen, after.data(), result.data()); });
+    see(sample, after, [&](auto* row, auto* seen) { type->action->torque(row, seen, result.data()); });
     return {result[0] - 1.0, result[1] - 2.0, result[2] - 3.0};
   }
-  PerJoint torque(const Sample& sample) const { return torque(sample, numbers, advanced(sample)); }
+  PerJoint torque(const Sample& sample) const { return torque(sample, advanced(sample)); }
 
   PerJoint accept(const Sample& sample) {
     memory = advanced(sample);
-    return torque(sample, numbers, memory);
+    return torque(sample, memory);
   }
 
   PerJoint slope(const Sample& sample, const Sample& direction, const std::vector<double>& after) const {
     PerJoint result{};
     const effect_direction along = along_of(direction);
-    if (type->slope) {
-      see(sample, [&](auto* seen) { type->slope(place, numbers.data(), seen, after.data(), &along, result.data()); });
+    if (type->action->slope) {
+      see(sample, after, [&](auto* row, auto* seen) { type->action->slope(row, seen, &along, result.data()); });
     }
     return result;
   }
@@ -210,8 +215,8 @@ TEST(Table, HasDifferentNamesAndNumbers) {
     EXPECT_TRUE(ids.insert(effect->id).second) << effect->name;
     EXPECT_EQ(effect_by_id(effect->id), effect);
     EXPECT_LE(effect->parameter_count, std::uint32_t{EFFECT_MAX_PARAMETERS});
-    EXPECT_EQ(effect->state_count || effect->memory_count, effect->advance || effect->kind == EFFECT_SIGNAL)
-        << effect->name;
+    const effect_action& acts = *effect->action;
+    EXPECT_EQ(acts.state_count || acts.memory_count, acts.advance || acts.kind == EFFECT_SIGNAL) << effect->name;
     for (std::uint32_t p = 0; p < effect->parameter_count; ++p) {
       const effect_parameter& number = effect->parameters[p];
       EXPECT_GT(number.scale, 0.0) << effect->name << "." << number.name;
@@ -231,7 +236,7 @@ TEST(Table, KeepsItsNumbers) {  // they stand in model images
   for (std::uint32_t id = 1; id <= 12; ++id) {
     ASSERT_NE(effect_by_id(id), nullptr) << id;
     EXPECT_STREQ(effect_by_id(id)->name, torques[id - 1]);
-    EXPECT_EQ(effect_by_id(id)->kind, EFFECT_TORQUE);
+    EXPECT_EQ(effect_by_id(id)->action->kind, EFFECT_TORQUE);
   }
 }
 

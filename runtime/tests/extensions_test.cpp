@@ -138,30 +138,6 @@ TEST(Presliding, HasNoMemoryFromWhereItsTendonMovesNoJoint) {
             (std::vector<double>{1.0, 1.0, 0.0}));
 }
 
-TEST(Places, OfARowAreTheSlotsThatItActsOn) {
-  Finger finger(test_finger::image());
-  constexpr auto nowhere = EFFECT_NOWHERE;
-  const effect_place places[] = {{0, nowhere, nowhere},
-                                 {1, nowhere, nowhere},
-                                 {nowhere, 0, nowhere},
-                                 {nowhere, 2, nowhere},
-                                 {nowhere, nowhere, nowhere}};
-  for (const effect_place& place : places) {
-    extension_row row{};
-    row.place = place;
-    std::vector<std::size_t> member(finger.handle->slots, 99);
-    for (std::size_t k = 0; k < friction_members(finger, place); ++k) {
-      member[friction_slot(finger, place, k)] = k;
-    }
-    for (std::size_t slot = 0; slot < finger.handle->slots; ++slot) {
-      std::size_t found = 0;
-      const bool acts = friction_acts_on(finger, &row, slot, &found) != 0;
-      EXPECT_EQ(acts, member[slot] != 99) << "slot " << slot;
-      EXPECT_TRUE(!acts || found == member[slot]) << "slot " << slot;
-    }
-  }
-}
-
 // --- derivatives ----------------------------------------------------------------------------------------------------
 
 // numbers that change afterwards do not change what the sample was

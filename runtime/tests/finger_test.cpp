@@ -500,7 +500,7 @@ TEST(SensorFault, ARowLeavesAndComesBackExactly) {
   fault[0] = POSITION_FAILS; /* both of a pair */
   use_rows(finger.handle, fault);
   EXPECT_EQ(finger.handle->scratch.angles_determined, 0);
-  recall_rows(finger.handle);
+  recall_sample(finger.handle);
   EXPECT_TRUE(std::equal(whole.begin(), whole.end(), inverse));
 }
 

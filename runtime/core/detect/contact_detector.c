@@ -127,7 +127,7 @@ static void begin_bands(tendonfmu_finger* f, size_t j, double time) {
 }
 
 void begin_detection(tendonfmu_finger* f, double time) {
-  for (size_t j = 0; f->derived.settings.has_bands && j < f->joints; ++j) {
+  for (size_t j = 0; has_option(f, MODEL_DETECTS_BY_BANDS) && j < f->joints; ++j) {
     begin_bands(f, j, time);
   }
 }
@@ -206,7 +206,7 @@ static int exceed_bands(tendonfmu_finger* f, double time, double step) {
   for (size_t j = 0; j < f->joints; ++j) {
     size_t band;
     f->scratch.unknown[j] = band_unknown(bands_of(f, j));
-    if (f->derived.settings.watches_sensors && s->watch[j] != JOINT_WATCHED) {
+    if (has_option(f, MODEL_HAS_SENSOR_FAULT) && s->watch[j] != JOINT_WATCHED) {
       begin_bands(f, j, time);
       continue;
     }
@@ -219,7 +219,7 @@ static int exceed_bands(tendonfmu_finger* f, double time, double step) {
 }
 
 int detect_contact(tendonfmu_finger* f, double mean_force, double time, double step) {
-  return f->derived.settings.has_bands ? exceed_bands(f, time, step) : exceed_thresholds(f, mean_force);
+  return has_option(f, MODEL_DETECTS_BY_BANDS) ? exceed_bands(f, time, step) : exceed_thresholds(f, mean_force);
 }
 
 void estimate_variance(tendonfmu_finger* f, double mean_force) {

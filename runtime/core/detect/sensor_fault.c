@@ -63,18 +63,12 @@ void use_rows(tendonfmu_finger* f, const double* fault) {
   }
 }
 
-void recall_rows(tendonfmu_finger* f) {
-  if (f->derived.settings.watches_sensors) {
-    use_rows(f, f->remembered.sensor.fault);
-  }
-}
-
 /* whether the torque of joint j, or its friction, reads the force of tendon i; joints with load friction read all */
 static int joint_reads(const tendonfmu_finger* f, size_t j, size_t i) {
   const int has_load_friction = (f->shape.words[j] >> 3 & 3) != LAW_ABSENT;
   int reads = has_load_friction || f->derived.moment_arm[j * f->tendon_lanes + i] != 0.0;
   for (size_t r = 0; r < f->shape.extension_count; ++r) {
-    const effect_place place = f->extensions.row[r].place;
+    const effect_place place = f->extensions.signal[r].place;
     reads |= place.joint == j && place.tendon == i;
   }
   return reads;
@@ -102,7 +96,7 @@ void weigh_forces(const tendonfmu_finger* f, const double* fault, double* weight
 }
 
 int any_joint_is_blind(const tendonfmu_finger* f) {
-  for (size_t j = 0; f->derived.settings.watches_sensors && j < f->joints; ++j) {
+  for (size_t j = 0; has_option(f, MODEL_HAS_SENSOR_FAULT) && j < f->joints; ++j) {
     if (f->remembered.watch[j] == JOINT_BLIND) {
       return 1;
     }

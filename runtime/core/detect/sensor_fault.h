@@ -13,9 +13,6 @@
  *   fault [M]    sensor_fault_kind; tendons of failing sensors leave in ascending order */
 void use_rows(tendonfmu_finger* finger, const double* fault);
 
-/* The same from what the finger remembers; nothing without sensor_fault. */
-void recall_rows(tendonfmu_finger* finger);
-
 /* Weights [m] of the tendons in the mean force: 1/(number of sound ones), 0 of a failing force; all where all fail. */
 void weigh_forces(const tendonfmu_finger* finger, const double* fault, double* weight);
 

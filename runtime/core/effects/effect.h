@@ -1,12 +1,12 @@
-/* A term beyond the paper: a file for those of a kind, one row each in the tables of effect_facts.c
+/* A term beyond the paper: a file for those of a kind, one row each in the table of effect_facts.c
  * (docs/reference/semantics/effects.md has the text they follow).
  *
  * A term acts in one of three ways: on the signals before the joint angles are known, on the friction values of some
- * places, or as a torque. It says what it remembers and which numbers it has; the finger does the rest.
+ * places, or as a torque. It says what it remembers; the finger does the rest.
  *
  * Order within a sample: advance() computes what the effect will remember, from what the sample before left; then its
  * other calls read that. It becomes the finger's memory only when the sample is accepted, and derivatives asked for
- * afterwards read the same memory: whatever they need of the sample before must be in it. */
+ * afterwards read the same: whatever they need of the sample before must be in it. */
 #pragma once
 
 #include <stddef.h>
@@ -104,11 +104,59 @@ typedef struct effect_grip {
 /* EFFECT_MEMORY: numbers alone, which friction_memory.c reads. */
 typedef enum effect_kind { EFFECT_TORQUE, EFFECT_FRICTION, EFFECT_SIGNAL, EFFECT_MEMORY } effect_kind;
 
-typedef struct effect_type {
-  const char* name; /* as in a description */
-  uint32_t id;      /* in the model image; never reused */
+typedef struct effect_action effect_action;
+
+/* One row of the description's extensions. */
+typedef struct extension_row {
+  const effect_action* action;
+  effect_place place;
+  const double* parameters;
+  const double* before; /* what the sample before left */
+  double* now;          /* what this one leaves; between samples the last one */
+  size_t memory_count;  /* numbers of these two */
+} extension_row;
+
+/* What an effect does. */
+struct effect_action {
   effect_kind kind;
-  int order;                   /* of signals: rows act in the order of these, whatever theirs */
+  int order; /* of signals: rows act in the order of these, whatever theirs */
+
+  /* Numbers that it remembers, part of the finger's state block: so many, or what state_count() says of a finger of n
+   * joints and m tendons. */
+  size_t memory_count;
+  size_t (*state_count)(size_t joints, size_t tendons, effect_place place);
+  /* now ← what it remembers once this sample is accepted; NULL with no memory, and of signals. Called when the
+   * kinematics are known. */
+  void (*advance)(const extension_row* row, const effect_sample* sample);
+
+  /* --- EFFECT_TORQUE ------------------------------------------------------------------------------------------------
+   * torque() adds to torque [n], N·m; */
+  void (*torque)(const extension_row* row, const effect_sample* sample, double* torque);
+  /* adds its derivative along a direction; the memory is held fixed except for what it says of this sample. NULL: 0. */
+  void (*slope)(const extension_row* row, const effect_sample* sample, const effect_direction* direction,
+                double* slope);
+  /* Of friction: the slot with whose velocity number k of its memory has its sign. Where friction has a memory there,
+   * the number builds up as friction of this size would; at joints the size enters the limit there, and the number is
+   * 0. torque() must be linear in the memory; NULL: not so. */
+  size_t (*slot)(const extension_row* row, size_t joints, size_t lanes, size_t k);
+  double (*size)(const extension_row* row, const effect_sample* sample); /* N, N·m */
+
+  /* --- EFFECT_FRICTION ----------------------------------------------------------------------------------------------
+   * member: which of the velocities of its place: 0 of a joint, the joint (0-based) of a tendon's; of a finger's
+   * joint·m + tendon, and after all of these n·m + joint for the joints' own */
+  effect_grip (*grip)(const extension_row* row, size_t member);
+
+  /* --- EFFECT_SIGNAL ------------------------------------------------------------------------------------------------
+   * Changes signals, twice a sample (late 0, then 1), and fills now; */
+  void (*signal)(const extension_row* row, effect_signals* signals);
+  /* turns a direction of what it was given into that of what it made of it. */
+  void (*signal_pass)(const extension_row* row, effect_signals* direction);
+};
+
+/* A row of the table of effects. */
+typedef struct effect_type {
+  const char* name;            /* as in a description */
+  uint32_t id;                 /* in the model image; never reused */
   unsigned char joint, tendon; /* place_need */
   unsigned char rule;          /* place_rule */
   unsigned char level;         /* 1: it may stand at a level */
@@ -116,40 +164,7 @@ typedef struct effect_type {
   unsigned char one_of;        /* of its first numbers exactly one is above 0; 0: no such rule */
   unsigned char parameter_count;
   const effect_parameter* parameters;
-
-  /* Numbers that it remembers, part of the finger's state block: so many, or what state_count() says of a finger of n
-   * joints and m tendons. */
-  size_t memory_count;
-  size_t (*state_count)(size_t joints, size_t tendons, effect_place place);
-  /* after ← what it remembers once this sample is accepted; NULL with no memory, and of signals. Called when the
-   * kinematics are known. */
-  void (*advance)(effect_place place, const double* parameters, const effect_sample* sample, const double* before,
-                  double* after);
-
-  /* --- EFFECT_TORQUE ------------------------------------------------------------------------------------------------
-   * torque() adds to torque [n], N·m; */
-  void (*torque)(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
-                 double* torque);
-  /* adds its derivative along a direction; the memory is held fixed except for what it says of this sample. NULL: 0. */
-  void (*slope)(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
-                const effect_direction* direction, double* slope);
-  /* Of friction: the slot with whose velocity number k of its memory has its sign. Where friction has a memory there,
-   * the number builds up as friction of this size would; at joints the size enters the limit there, and the number is
-   * 0. torque() must be linear in the memory; NULL: not so. */
-  size_t (*slot)(effect_place place, size_t joints, size_t lanes, size_t k);
-  double (*size)(effect_place place, const double* parameters, const effect_sample* sample); /* N, N·m */
-
-  /* --- EFFECT_FRICTION ----------------------------------------------------------------------------------------------
-   * member: which of the velocities of its place: 0 of a joint, the joint (0-based) of a tendon's; of a finger's
-   * joint·m + tendon, and after all of these n·m + joint for the joints' own */
-  effect_grip (*grip)(effect_place place, const double* parameters, const double* memory, size_t member);
-
-  /* --- EFFECT_SIGNAL ------------------------------------------------------------------------------------------------
-   * Changes signals, twice a sample (late 0, then 1), and fills after from before; */
-  void (*signal)(effect_place place, const double* parameters, effect_signals* signals, const double* before,
-                 double* after);
-  /* turns a direction of what it was given into that of what it made of it. */
-  void (*signal_pass)(effect_place place, const double* parameters, const double* memory, effect_signals* direction);
+  const effect_action* action;
 } effect_type;
 
 /* Row by id; NULL when there is none. */

@@ -4,124 +4,70 @@
 
 #include "effect_facts.h"
 
-const effect_parameter cover_hardening_numbers[2] = {
-  {.name = "stiffness", .unit = "N.m/rad3", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1000000000.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 1, .scale = 0.05, .scale_everywhere = 0.0},
-  {.name = "quadratic", .unit = "N.m/rad2", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1000000000.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 0, .scale = 0.02, .scale_everywhere = 0.0},
+static const effect_parameter numbers[] = {
+  {.name = "stiffness", .unit = "N.m/rad3", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1000000000.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 1, .scale = 0.05, .scale_everywhere = 0.0}, /* cover_hardening */
+  {.name = "quadratic", .unit = "N.m/rad2", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1000000000.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 0, .scale = 0.02, .scale_everywhere = 0.0}, /* cover_hardening */
+  {.name = "sine", .unit = "N.m", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1000000000.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 0, .scale = 0.005, .scale_everywhere = 0.0}, /* gravity */
+  {.name = "cosine", .unit = "N.m", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1000000000.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 0, .scale = 0.005, .scale_everywhere = 0.0}, /* gravity */
+  {.name = "inertia", .unit = "kg.m2", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1000000000.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 1, .scale = 1e-05, .scale_everywhere = 0.0}, /* inertia */
+  {.name = "sine", .unit = "kg.m2", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1000000000.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 0, .scale = 1e-05, .scale_everywhere = 0.0}, /* inertia_variation */
+  {.name = "cosine", .unit = "kg.m2", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1000000000.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 0, .scale = 1e-05, .scale_everywhere = 0.0}, /* inertia_variation */
+  {.name = "stiffness", .unit = "N.m/rad", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1000000000.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 1, .scale = 0.02, .scale_everywhere = 0.0}, /* joint_coupling */
+  {.name = "reaction", .unit = "1", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -10.0, .maximum = 10.0, .above_minimum = 0, .missing_value = 1.0, .required = 0, .scale = 1.0, .scale_everywhere = 0.0}, /* joint_coupling */
+  {.name = "coulomb", .unit = "N", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1000000000.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 1, .scale = 0.2, .scale_everywhere = 0.0}, /* preload_friction */
+  {.name = "beyond", .unit = "1", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -10.0, .maximum = 10.0, .above_minimum = 0, .missing_value = 1.0, .required = 0, .scale = 1.0, .scale_everywhere = 0.0}, /* preload_friction */
+  {.name = "coulomb", .unit = "m", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1000000000.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 1, .scale = 0.0001, .scale_everywhere = 0.0}, /* load_friction */
+  {.name = "correction", .unit = "1", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1.0, .maximum = 1000000000.0, .above_minimum = 1, .missing_value = 0.0, .required = 1, .scale = 0.05, .scale_everywhere = 0.0}, /* force_gain */
+  {.name = "correction", .unit = "N", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1000000000.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 1, .scale = 0.5, .scale_everywhere = 0.0}, /* force_offset */
+  {.name = "correction", .unit = "m", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1000000000.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 1, .scale = 0.0005, .scale_everywhere = 0.0}, /* moment_arm */
+  {.name = "slope", .unit = "m/rad", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1000000000.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 1, .scale = 0.0005, .scale_everywhere = 0.0}, /* moment_arm_variation */
+  {.name = "sine", .unit = "m", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1000000000.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 0, .scale = 0.0005, .scale_everywhere = 0.0}, /* pulley_eccentricity */
+  {.name = "cosine", .unit = "m", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1000000000.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 0, .scale = 0.0005, .scale_everywhere = 0.0}, /* pulley_eccentricity */
+  {.name = "turns", .unit = "1", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = 0.0, .maximum = 1000.0, .above_minimum = 0, .missing_value = 1.0, .required = 0, .scale = 1.0, .scale_everywhere = 0.0}, /* pulley_eccentricity */
+  {.name = "displacement", .unit = "m", .unit_at_joint = "rad", .unit_everywhere = "s", .minimum = 0.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 0, .scale = 0.0001, .scale_everywhere = 0.05}, /* presliding */
+  {.name = "stiffness", .unit = "N/m", .unit_at_joint = "N.m/rad", .unit_everywhere = NULL, .minimum = 0.0, .maximum = 1000000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 0, .scale = 10000.0, .scale_everywhere = 0.0}, /* presliding */
+  {.name = "relaxation_time", .unit = "s", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = 0.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 0, .scale = 1.0, .scale_everywhere = 0.0}, /* presliding */
+  {.name = "share", .unit = "1", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = 0.0, .maximum = 1000000000.0, .above_minimum = 1, .missing_value = 1.0, .required = 0, .scale = 1.0, .scale_everywhere = 0.0}, /* presliding */
+  {.name = "stiffness", .unit = "N/m", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = 1.0, .maximum = 1000000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 1, .scale = 100000.0, .scale_everywhere = 0.0}, /* cord_stretch */
+  {.name = "amplitude", .unit = "1", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -0.9, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 1, .scale = 0.3, .scale_everywhere = 0.0}, /* friction_drift */
+  {.name = "time_constant", .unit = "s", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = 0.0, .maximum = 1000000000.0, .above_minimum = 1, .missing_value = 0.0, .required = 1, .scale = 100.0, .scale_everywhere = 0.0}, /* friction_drift */
+  {.name = "hardening", .unit = "N/m2", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = 0.0, .maximum = 1000000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 1, .scale = 100000.0, .scale_everywhere = 0.0}, /* tendon_nonlinearity */
+  {.name = "width", .unit = "m", .unit_at_joint = "rad", .unit_everywhere = NULL, .minimum = 0.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 1, .scale = 0.0001, .scale_everywhere = 0.0}, /* backlash */
+  {.name = "delay", .unit = "s", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -0.05, .maximum = 0.05, .above_minimum = 0, .missing_value = 0.0, .required = 1, .scale = 0.002, .scale_everywhere = 0.0}, /* time_delay */
+  {.name = "amplitude", .unit = "1", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -0.99, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 1, .scale = 0.3, .scale_everywhere = 0.0}, /* stribeck */
+  {.name = "stribeck_velocity", .unit = "m/s", .unit_at_joint = "rad/s", .unit_everywhere = NULL, .minimum = 0.0, .maximum = 1000000000.0, .above_minimum = 1, .missing_value = 0.0, .required = 1, .scale = 0.01, .scale_everywhere = 0.0}, /* stribeck */
 };
 
-const effect_parameter gravity_numbers[2] = {
-  {.name = "sine", .unit = "N.m", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1000000000.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 0, .scale = 0.005, .scale_everywhere = 0.0},
-  {.name = "cosine", .unit = "N.m", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1000000000.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 0, .scale = 0.005, .scale_everywhere = 0.0},
-};
-
-const effect_parameter inertia_numbers[1] = {
-  {.name = "inertia", .unit = "kg.m2", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1000000000.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 1, .scale = 1e-05, .scale_everywhere = 0.0},
-};
-
-const effect_parameter inertia_variation_numbers[2] = {
-  {.name = "sine", .unit = "kg.m2", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1000000000.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 0, .scale = 1e-05, .scale_everywhere = 0.0},
-  {.name = "cosine", .unit = "kg.m2", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1000000000.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 0, .scale = 1e-05, .scale_everywhere = 0.0},
-};
-
-const effect_parameter joint_coupling_numbers[2] = {
-  {.name = "stiffness", .unit = "N.m/rad", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1000000000.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 1, .scale = 0.02, .scale_everywhere = 0.0},
-  {.name = "reaction", .unit = "1", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -10.0, .maximum = 10.0, .above_minimum = 0, .missing_value = 1.0, .required = 0, .scale = 1.0, .scale_everywhere = 0.0},
-};
-
-const effect_parameter preload_friction_numbers[2] = {
-  {.name = "coulomb", .unit = "N", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1000000000.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 1, .scale = 0.2, .scale_everywhere = 0.0},
-  {.name = "beyond", .unit = "1", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -10.0, .maximum = 10.0, .above_minimum = 0, .missing_value = 1.0, .required = 0, .scale = 1.0, .scale_everywhere = 0.0},
-};
-
-const effect_parameter load_friction_numbers[1] = {
-  {.name = "coulomb", .unit = "m", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1000000000.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 1, .scale = 0.0001, .scale_everywhere = 0.0},
-};
-
-const effect_parameter force_gain_numbers[1] = {
-  {.name = "correction", .unit = "1", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1.0, .maximum = 1000000000.0, .above_minimum = 1, .missing_value = 0.0, .required = 1, .scale = 0.05, .scale_everywhere = 0.0},
-};
-
-const effect_parameter force_offset_numbers[1] = {
-  {.name = "correction", .unit = "N", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1000000000.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 1, .scale = 0.5, .scale_everywhere = 0.0},
-};
-
-const effect_parameter moment_arm_numbers[1] = {
-  {.name = "correction", .unit = "m", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1000000000.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 1, .scale = 0.0005, .scale_everywhere = 0.0},
-};
-
-const effect_parameter moment_arm_variation_numbers[1] = {
-  {.name = "slope", .unit = "m/rad", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1000000000.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 1, .scale = 0.0005, .scale_everywhere = 0.0},
-};
-
-const effect_parameter pulley_eccentricity_numbers[3] = {
-  {.name = "sine", .unit = "m", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1000000000.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 0, .scale = 0.0005, .scale_everywhere = 0.0},
-  {.name = "cosine", .unit = "m", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -1000000000.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 0, .scale = 0.0005, .scale_everywhere = 0.0},
-  {.name = "turns", .unit = "1", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = 0.0, .maximum = 1000.0, .above_minimum = 0, .missing_value = 1.0, .required = 0, .scale = 1.0, .scale_everywhere = 0.0},
-};
-
-const effect_parameter presliding_numbers[4] = {
-  {.name = "displacement", .unit = "m", .unit_at_joint = "rad", .unit_everywhere = "s", .minimum = 0.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 0, .scale = 0.0001, .scale_everywhere = 0.05},
-  {.name = "stiffness", .unit = "N/m", .unit_at_joint = "N.m/rad", .unit_everywhere = NULL, .minimum = 0.0, .maximum = 1000000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 0, .scale = 10000.0, .scale_everywhere = 0.0},
-  {.name = "relaxation_time", .unit = "s", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = 0.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 0, .scale = 1.0, .scale_everywhere = 0.0},
-  {.name = "share", .unit = "1", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = 0.0, .maximum = 1000000000.0, .above_minimum = 1, .missing_value = 1.0, .required = 0, .scale = 1.0, .scale_everywhere = 0.0},
-};
-
-const effect_parameter cord_stretch_numbers[1] = {
-  {.name = "stiffness", .unit = "N/m", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = 1.0, .maximum = 1000000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 1, .scale = 100000.0, .scale_everywhere = 0.0},
-};
-
-const effect_parameter friction_drift_numbers[2] = {
-  {.name = "amplitude", .unit = "1", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -0.9, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 1, .scale = 0.3, .scale_everywhere = 0.0},
-  {.name = "time_constant", .unit = "s", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = 0.0, .maximum = 1000000000.0, .above_minimum = 1, .missing_value = 0.0, .required = 1, .scale = 100.0, .scale_everywhere = 0.0},
-};
-
-const effect_parameter tendon_nonlinearity_numbers[1] = {
-  {.name = "hardening", .unit = "N/m2", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = 0.0, .maximum = 1000000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 1, .scale = 100000.0, .scale_everywhere = 0.0},
-};
-
-const effect_parameter backlash_numbers[1] = {
-  {.name = "width", .unit = "m", .unit_at_joint = "rad", .unit_everywhere = NULL, .minimum = 0.0, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 1, .scale = 0.0001, .scale_everywhere = 0.0},
-};
-
-const effect_parameter time_delay_numbers[1] = {
-  {.name = "delay", .unit = "s", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -0.05, .maximum = 0.05, .above_minimum = 0, .missing_value = 0.0, .required = 1, .scale = 0.002, .scale_everywhere = 0.0},
-};
-
-const effect_parameter stribeck_numbers[2] = {
-  {.name = "amplitude", .unit = "1", .unit_at_joint = NULL, .unit_everywhere = NULL, .minimum = -0.99, .maximum = 1000000000.0, .above_minimum = 0, .missing_value = 0.0, .required = 1, .scale = 0.3, .scale_everywhere = 0.0},
-  {.name = "stribeck_velocity", .unit = "m/s", .unit_at_joint = "rad/s", .unit_everywhere = NULL, .minimum = 0.0, .maximum = 1000000000.0, .above_minimum = 1, .missing_value = 0.0, .required = 1, .scale = 0.01, .scale_everywhere = 0.0},
-};
-
-const effect_type* const all_effects[EFFECT_COUNT] = {
-  &effect_cover_hardening,
-  &effect_gravity,
-  &effect_inertia,
-  &effect_inertia_variation,
-  &effect_joint_coupling,
-  &effect_preload_friction,
-  &effect_load_friction,
-  &effect_force_gain,
-  &effect_force_offset,
-  &effect_moment_arm,
-  &effect_moment_arm_variation,
-  &effect_pulley_eccentricity,
-  &effect_presliding,
-  &effect_cord_stretch,
-  &effect_friction_drift,
-  &effect_tendon_nonlinearity,
-  &effect_backlash,
-  &effect_time_delay,
-  &effect_stribeck,
+static const effect_type all_effects[EFFECT_COUNT] = {
+  {.name = "cover_hardening", .id = 1, .joint = PLACE_REQUIRED, .tendon = PLACE_REFUSED, .rule = PLACES_AS_SAID, .level = 0, .most = 0, .one_of = 0, .parameter_count = 2, .parameters = numbers + 0, .action = &cover_hardening_action},
+  {.name = "gravity", .id = 2, .joint = PLACE_REQUIRED, .tendon = PLACE_REFUSED, .rule = PLACES_AS_SAID, .level = 0, .most = 0, .one_of = 0, .parameter_count = 2, .parameters = numbers + 2, .action = &gravity_action},
+  {.name = "inertia", .id = 3, .joint = PLACE_REQUIRED, .tendon = PLACE_REFUSED, .rule = PLACES_AS_SAID, .level = 0, .most = 0, .one_of = 0, .parameter_count = 1, .parameters = numbers + 4, .action = &inertia_action},
+  {.name = "inertia_variation", .id = 12, .joint = PLACE_REQUIRED, .tendon = PLACE_REFUSED, .rule = PLACES_NOT_LAST_JOINT, .level = 0, .most = 0, .one_of = 0, .parameter_count = 2, .parameters = numbers + 5, .action = &inertia_variation_action},
+  {.name = "joint_coupling", .id = 4, .joint = PLACE_REQUIRED, .tendon = PLACE_REFUSED, .rule = PLACES_NOT_LAST_JOINT, .level = 0, .most = 0, .one_of = 0, .parameter_count = 2, .parameters = numbers + 7, .action = &joint_coupling_action},
+  {.name = "preload_friction", .id = 5, .joint = PLACE_OPTIONAL, .tendon = PLACE_REQUIRED, .rule = PLACES_AS_SAID, .level = 0, .most = 0, .one_of = 0, .parameter_count = 2, .parameters = numbers + 9, .action = &preload_friction_action},
+  {.name = "load_friction", .id = 6, .joint = PLACE_REQUIRED, .tendon = PLACE_REQUIRED, .rule = PLACES_AS_SAID, .level = 0, .most = 0, .one_of = 0, .parameter_count = 1, .parameters = numbers + 11, .action = &load_friction_action},
+  {.name = "force_gain", .id = 7, .joint = PLACE_REFUSED, .tendon = PLACE_REQUIRED, .rule = PLACES_AS_SAID, .level = 0, .most = 0, .one_of = 0, .parameter_count = 1, .parameters = numbers + 12, .action = &force_gain_action},
+  {.name = "force_offset", .id = 8, .joint = PLACE_REFUSED, .tendon = PLACE_REQUIRED, .rule = PLACES_AS_SAID, .level = 0, .most = 0, .one_of = 0, .parameter_count = 1, .parameters = numbers + 13, .action = &force_offset_action},
+  {.name = "moment_arm", .id = 9, .joint = PLACE_REQUIRED, .tendon = PLACE_REQUIRED, .rule = PLACES_AS_SAID, .level = 0, .most = 0, .one_of = 0, .parameter_count = 1, .parameters = numbers + 14, .action = &moment_arm_action},
+  {.name = "moment_arm_variation", .id = 10, .joint = PLACE_REQUIRED, .tendon = PLACE_REQUIRED, .rule = PLACES_AS_SAID, .level = 0, .most = 0, .one_of = 0, .parameter_count = 1, .parameters = numbers + 15, .action = &moment_arm_variation_action},
+  {.name = "pulley_eccentricity", .id = 11, .joint = PLACE_REQUIRED, .tendon = PLACE_REQUIRED, .rule = PLACES_AS_SAID, .level = 0, .most = 0, .one_of = 0, .parameter_count = 3, .parameters = numbers + 16, .action = &pulley_eccentricity_action},
+  {.name = "presliding", .id = 26, .joint = PLACE_OPTIONAL, .tendon = PLACE_OPTIONAL, .rule = PLACES_LEVEL_ALONE, .level = 1, .most = 2, .one_of = 2, .parameter_count = 4, .parameters = numbers + 19, .action = &presliding_action},
+  {.name = "cord_stretch", .id = 27, .joint = PLACE_REFUSED, .tendon = PLACE_REFUSED, .rule = PLACES_AS_SAID, .level = 0, .most = 1, .one_of = 0, .parameter_count = 1, .parameters = numbers + 23, .action = &cord_stretch_action},
+  {.name = "friction_drift", .id = 21, .joint = PLACE_OPTIONAL, .tendon = PLACE_OPTIONAL, .rule = PLACES_AT_MOST_ONE, .level = 0, .most = 0, .one_of = 0, .parameter_count = 2, .parameters = numbers + 24, .action = &friction_drift_action},
+  {.name = "tendon_nonlinearity", .id = 22, .joint = PLACE_REFUSED, .tendon = PLACE_REQUIRED, .rule = PLACES_AS_SAID, .level = 0, .most = 1, .one_of = 0, .parameter_count = 1, .parameters = numbers + 26, .action = &tendon_nonlinearity_action},
+  {.name = "backlash", .id = 23, .joint = PLACE_OPTIONAL, .tendon = PLACE_OPTIONAL, .rule = PLACES_EXACTLY_ONE, .level = 0, .most = 1, .one_of = 0, .parameter_count = 1, .parameters = numbers + 27, .action = &backlash_action},
+  {.name = "time_delay", .id = 24, .joint = PLACE_REFUSED, .tendon = PLACE_REFUSED, .rule = PLACES_AS_SAID, .level = 0, .most = 1, .one_of = 0, .parameter_count = 1, .parameters = numbers + 28, .action = &time_delay_action},
+  {.name = "stribeck", .id = 25, .joint = PLACE_OPTIONAL, .tendon = PLACE_OPTIONAL, .rule = PLACES_EXACTLY_ONE, .level = 0, .most = 0, .one_of = 0, .parameter_count = 2, .parameters = numbers + 29, .action = &stribeck_action},
 };
 
 const effect_type* effect_at(size_t position) {
-  return position < EFFECT_COUNT ? all_effects[position] : NULL;
+  return position < EFFECT_COUNT ? &all_effects[position] : NULL;
 }
 
 const effect_type* effect_by_id(uint32_t id) {
-  for (size_t i = 0; effect_at(i); ++i) {
-    if (all_effects[i]->id == id) {
-      return all_effects[i];
+  for (size_t i = 0; i < EFFECT_COUNT; ++i) {
+    if (all_effects[i].id == id) {
+      return &all_effects[i];
     }
   }
   return NULL;

@@ -4,43 +4,27 @@
 
 /* The true force of a tendon is (1 + correction)·f0: T_j = −correction·r_ij·f0 at every joint. */
 
-static void gain_to_joints(effect_place place, const effect_sample* sample, double force, double* torque) {
+static void force_to_joints(const extension_row* row, const effect_sample* sample, double force, double* torque) {
   for (size_t j = 0; j < sample->joints; ++j) {
-    torque[j] -= arm_at(sample, j, place.tendon) * force;
+    torque[j] -= arm_at(sample, j, row->place.tendon) * force;
   }
 }
 
-static void gain_torque(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
-                        double* torque) {
-  (void)memory;
-  gain_to_joints(place, sample, parameters[0] * sample->force[place.tendon], torque);
+static void gain_torque(const extension_row* row, const effect_sample* sample, double* torque) {
+  force_to_joints(row, sample, row->parameters[0] * sample->force[row->place.tendon], torque);
 }
 
-static void gain_slope(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
-                       const effect_direction* direction, double* slope) {
-  (void)memory;
-  gain_to_joints(place, sample, parameters[0] * direction->force[place.tendon], slope);
+static void gain_slope(const extension_row* row, const effect_sample* sample, const effect_direction* direction,
+                       double* slope) {
+  force_to_joints(row, sample, row->parameters[0] * direction->force[row->place.tendon], slope);
 }
 
-const effect_type effect_force_gain = {
-    FORCE_GAIN_FACTS,
-    .kind = EFFECT_TORQUE,
-    .torque = gain_torque,
-    .slope = gain_slope,
-};
+const effect_action force_gain_action = {.kind = EFFECT_TORQUE, .torque = gain_torque, .slope = gain_slope};
 
 /* The true force of a tendon is f0 + correction: T_j = −correction·r_ij at every joint. */
 
-static void offset_torque(effect_place place, const double* parameters, const effect_sample* sample,
-                          const double* memory, double* torque) {
-  (void)memory;
-  for (size_t j = 0; j < sample->joints; ++j) {
-    torque[j] -= parameters[0] * arm_at(sample, j, place.tendon);
-  }
+static void offset_torque(const extension_row* row, const effect_sample* sample, double* torque) {
+  force_to_joints(row, sample, row->parameters[0], torque);
 }
 
-const effect_type effect_force_offset = {
-    FORCE_OFFSET_FACTS,
-    .kind = EFFECT_TORQUE,
-    .torque = offset_torque,
-};
+const effect_action force_offset_action = {.kind = EFFECT_TORQUE, .torque = offset_torque};

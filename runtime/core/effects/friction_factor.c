@@ -16,28 +16,25 @@ static double come_so_far(double elapsed, double time_constant) {
   return elapsed > 0.0 ? law_one_minus_exponential(elapsed / time_constant) : 0.0;
 }
 
-static void drift_advance(effect_place place, const double* values, const effect_sample* sample, const double* before,
-                          double* after) {
-  (void)place;
-  after[FIRST_TIME] = sample->first ? sample->time : before[FIRST_TIME];
-  after[ELAPSED] = sample->time - after[FIRST_TIME];
-  after[TOLD_CONSTANT] = values[TIME_CONSTANT];
-  after[COME] = come_so_far(after[ELAPSED], values[TIME_CONSTANT]);
+static void drift_advance(const extension_row* row, const effect_sample* sample) {
+  const double constant = row->parameters[TIME_CONSTANT];
+  row->now[FIRST_TIME] = sample->first ? sample->time : row->before[FIRST_TIME];
+  row->now[ELAPSED] = sample->time - row->now[FIRST_TIME];
+  row->now[TOLD_CONSTANT] = constant;
+  row->now[COME] = come_so_far(row->now[ELAPSED], constant);
 }
 
 /* of every velocity of its place the same, so the exponential is remembered; the number may have changed since */
-static effect_grip drift_grip(effect_place place, const double* values, const double* memory, size_t member) {
-  (void)place;
+static effect_grip drift_grip(const extension_row* row, size_t member) {
   (void)member;
-  const int same = memory[TOLD_CONSTANT] == values[TIME_CONSTANT];
-  const double come = same ? memory[COME] : come_so_far(memory[ELAPSED], values[TIME_CONSTANT]);
-  return (effect_grip){.value = 1.0 + values[AMPLITUDE] * come};
+  const double constant = row->parameters[TIME_CONSTANT];
+  const int same = row->now[TOLD_CONSTANT] == constant;
+  const double come = same ? row->now[COME] : come_so_far(row->now[ELAPSED], constant);
+  return (effect_grip){.value = 1.0 + row->parameters[AMPLITUDE] * come};
 }
 
-const effect_type effect_friction_drift = {
-    FRICTION_DRIFT_FACTS,     .kind = EFFECT_FRICTION, .memory_count = MEMORY_COUNT,
-    .advance = drift_advance, .grip = drift_grip,
-};
+const effect_action friction_drift_action = {
+    .kind = EFFECT_FRICTION, .memory_count = MEMORY_COUNT, .advance = drift_advance, .grip = drift_grip};
 
 /* F × (1 + amplitude·exp(−|v|/stribeck_velocity)): friction near standstill differs; amplitude below 0: it rises with
  * speed, as rolling friction does, which no law with static ≥ coulomb can. */
@@ -55,30 +52,25 @@ static size_t stribeck_state_count(size_t joints, size_t tendons, effect_place p
   return MEMORY_ROWS * member_count(place, joints);
 }
 
-static void stribeck_advance(effect_place place, const double* values, const effect_sample* sample,
-                             const double* before, double* after) {
-  (void)values;
-  (void)before;
+static void stribeck_advance(const extension_row* row, const effect_sample* sample) {
+  const effect_place place = row->place;
   const size_t count = member_count(place, sample->joints);
-  for (size_t k = 0; k < count; ++k, after += MEMORY_ROWS) {
+  for (size_t k = 0; k < count; ++k) {
     const double v = place.joint != EFFECT_NOWHERE ? sample->velocity[place.joint]
                                                    : sample->tendon_velocity[k * sample->lanes + place.tendon];
-    after[SPEED] = fabs(v);
-    after[SIDE] = v < 0.0 ? -1.0 : 1.0;
+    row->now[MEMORY_ROWS * k + SPEED] = fabs(v);
+    row->now[MEMORY_ROWS * k + SIDE] = v < 0.0 ? -1.0 : 1.0;
   }
 }
 
-static effect_grip stribeck_grip(effect_place place, const double* values, const double* memory, size_t member) {
-  (void)place;
-  memory += MEMORY_ROWS * member;
-  const double ratio = memory[SPEED] / values[STRIBECK_VELOCITY];
+static effect_grip stribeck_grip(const extension_row* row, size_t member) {
+  const double *at = row->now + MEMORY_ROWS * member, *values = row->parameters;
+  const double ratio = at[SPEED] / values[STRIBECK_VELOCITY];
   /* ratio·e^−ratio stays finite; a ratio that is not has come to its end */
   const double near = law_exponential(ratio), change = ratio < 700.0 ? values[AMPLITUDE] * near : 0.0;
   return (effect_grip){.value = 1.0 + values[AMPLITUDE] * near,
-                       .by_velocity = -change * memory[SIDE] / values[STRIBECK_VELOCITY]};
+                       .by_velocity = -change * at[SIDE] / values[STRIBECK_VELOCITY]};
 }
 
-const effect_type effect_stribeck = {
-    STRIBECK_FACTS,        .kind = EFFECT_FRICTION, .state_count = stribeck_state_count, .advance = stribeck_advance,
-    .grip = stribeck_grip,
-};
+const effect_action stribeck_action = {
+    .kind = EFFECT_FRICTION, .state_count = stribeck_state_count, .advance = stribeck_advance, .grip = stribeck_grip};

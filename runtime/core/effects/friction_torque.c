@@ -17,84 +17,77 @@ static size_t preload_state_count(size_t joints, size_t tendons, effect_place pl
 }
 
 /* the first joint before which there is friction */
-static size_t from_joint(effect_place place) {
-  return place.joint == EFFECT_NOWHERE ? 0 : place.joint;
+static size_t from_joint(const extension_row* row) {
+  return row->place.joint == EFFECT_NOWHERE ? 0 : row->place.joint;
 }
 
-static void preload_advance(effect_place place, const double* parameters, const effect_sample* sample,
-                            const double* before, double* after) {
-  (void)parameters;
-  const size_t from = from_joint(place), count = preload_state_count(sample->joints, sample->tendons, place);
-  for (size_t k = 0; k < count; ++k) {
-    const double velocity = sample->tendon_velocity[(from + k) * sample->lanes + place.tendon];
-    after[k] = held_side(sample, velocity, sample->tendon_threshold, before + k);
+static size_t preload_slot(const extension_row* row, size_t joints, size_t lanes, size_t k) {
+  (void)joints;
+  return (from_joint(row) + k) * lanes + row->place.tendon;
+}
+
+static void preload_advance(const extension_row* row, const effect_sample* sample) {
+  for (size_t k = 0; k < row->memory_count; ++k) {
+    const double velocity = sample->tendon_velocity[preload_slot(row, sample->joints, sample->lanes, k)];
+    row->now[k] = held_side(sample, velocity, sample->tendon_threshold, row->before + k);
   }
 }
 
-static size_t preload_slot(effect_place place, size_t joints, size_t lanes, size_t k) {
-  (void)joints;
-  return (from_joint(place) + k) * lanes + place.tendon;
-}
-
-static double preload_size(effect_place place, const double* parameters, const effect_sample* sample) {
-  (void)place;
+static double preload_size(const extension_row* row, const effect_sample* sample) {
   (void)sample;
-  return fabs(parameters[COULOMB]);
+  return fabs(row->parameters[COULOMB]);
 }
 
-/* adds own times what is lost before each joint itself, and before times what is lost before the joints before it */
-static void add_lost(effect_place place, const effect_sample* sample, const double* memory, double own, double before,
-                     double* torque) {
-  const size_t from = from_joint(place), count = preload_state_count(sample->joints, sample->tendons, place);
+/* what is lost before each joint itself, and what of that before the joints before it is felt there */
+static void preload_torque(const extension_row* row, const effect_sample* sample, double* torque) {
+  const double own = row->parameters[COULOMB], beyond = own * row->parameters[BEYOND];
+  const size_t from = from_joint(row);
   double lost_before = 0.0;
   for (size_t j = from; j < sample->joints; ++j) {
-    const double lost = j - from < count ? memory[j - from] : 0.0;
-    torque[j] += arm_at(sample, j, place.tendon) * (own * lost + before * lost_before);
+    const double lost = j - from < row->memory_count ? row->now[j - from] : 0.0;
+    torque[j] += arm_at(sample, j, row->place.tendon) * (own * lost + beyond * lost_before);
     lost_before += lost;
   }
 }
 
-static void preload_torque(effect_place place, const double* parameters, const effect_sample* sample,
-                           const double* memory, double* torque) {
-  add_lost(place, sample, memory, parameters[COULOMB], parameters[COULOMB] * parameters[BEYOND], torque);
-}
-
-const effect_type effect_preload_friction = {
-    PRELOAD_FRICTION_FACTS,     .kind = EFFECT_TORQUE,    .state_count = preload_state_count,
-    .advance = preload_advance, .torque = preload_torque, .slot = preload_slot,
-    .size = preload_size,
-};
+const effect_action preload_friction_action = {.kind = EFFECT_TORQUE,
+                                               .state_count = preload_state_count,
+                                               .advance = preload_advance,
+                                               .torque = preload_torque,
+                                               .slot = preload_slot,
+                                               .size = preload_size};
 
 /* T_j = coulomb·|f0|·s: Coulomb friction in a joint that grows with the force of one tendon, s the sign of the joint's
  * velocity when it last moved. */
 
-static void load_advance(effect_place place, const double* parameters, const effect_sample* sample,
-                         const double* before, double* after) {
-  (void)parameters;
-  after[0] = held_side(sample, sample->velocity[place.joint], sample->joint_threshold, before);
+static void load_advance(const extension_row* row, const effect_sample* sample) {
+  row->now[0] = held_side(sample, sample->velocity[row->place.joint], sample->joint_threshold, row->before);
 }
 
-static size_t load_slot(effect_place place, size_t joints, size_t lanes, size_t k) {
+static size_t load_slot(const extension_row* row, size_t joints, size_t lanes, size_t k) {
   (void)k;
-  return joints * lanes + place.joint;
+  return joints * lanes + row->place.joint;
 }
 
-static double load_size(effect_place place, const double* parameters, const effect_sample* sample) {
-  return parameters[0] * fabs(sample->force[place.tendon]);
+static double load_size(const extension_row* row, const effect_sample* sample) {
+  return row->parameters[0] * fabs(sample->force[row->place.tendon]);
 }
 
-static void load_torque(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
-                        double* torque) {
-  torque[place.joint] += parameters[0] * memory[0] * fabs(sample->force[place.tendon]);
+static void load_torque(const extension_row* row, const effect_sample* sample, double* torque) {
+  torque[row->place.joint] += row->parameters[0] * row->now[0] * fabs(sample->force[row->place.tendon]);
 }
 
-static void load_slope(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
-                       const effect_direction* direction, double* slope) {
-  const double change = direction->force[place.tendon];
-  slope[place.joint] += parameters[0] * memory[0] * (sample->force[place.tendon] < 0.0 ? -change : change);
+static void load_slope(const extension_row* row, const effect_sample* sample, const effect_direction* direction,
+                       double* slope) {
+  const double change = direction->force[row->place.tendon];
+  slope[row->place.joint] +=
+      row->parameters[0] * row->now[0] * (sample->force[row->place.tendon] < 0.0 ? -change : change);
 }
 
-const effect_type effect_load_friction = {
-    LOAD_FRICTION_FACTS,   .kind = EFFECT_TORQUE, .memory_count = 1, .advance = load_advance,
-    .torque = load_torque, .slope = load_slope,   .slot = load_slot, .size = load_size,
-};
+const effect_action load_friction_action = {.kind = EFFECT_TORQUE,
+                                            .memory_count = 1,
+                                            .advance = load_advance,
+                                            .torque = load_torque,
+                                            .slope = load_slope,
+                                            .slot = load_slot,
+                                            .size = load_size};

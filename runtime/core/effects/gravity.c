@@ -11,11 +11,11 @@ static double axis_cosine(const effect_sample* sample, size_t joint, size_t link
   return sample->axis_cosine[joint * sample->joints + link];
 }
 
-/* Σ_{k<=l} w_k·row_k: θ of the angles, or its derivative along a direction */
-static double turned(const effect_sample* sample, size_t link, const double* row) {
+/* Σ_{k<=l} w_k·angle_k: θ of the angles, or its derivative along a direction */
+static double turned(const effect_sample* sample, size_t link, const double* angle) {
   double sum = 0.0;
   for (size_t k = 0; k <= link; ++k) {
-    sum += axis_cosine(sample, k, link) * row[k];
+    sum += axis_cosine(sample, k, link) * angle[k];
   }
   return sum;
 }
@@ -26,24 +26,18 @@ static void add_to_joints(const effect_sample* sample, size_t link, double amoun
   }
 }
 
-static void torque(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
-                   double* torque) {
-  (void)memory;
-  const sine_cosine at = sine_cosine_of(turned(sample, place.joint, sample->angle));
-  add_to_joints(sample, place.joint, parameters[0] * at.sine + parameters[1] * at.cosine, torque);
+static void torque(const extension_row* row, const effect_sample* sample, double* torque) {
+  const size_t link = row->place.joint;
+  const sine_cosine at = sine_cosine_of(turned(sample, link, sample->angle));
+  add_to_joints(sample, link, row->parameters[0] * at.sine + row->parameters[1] * at.cosine, torque);
 }
 
-static void slope(effect_place place, const double* parameters, const effect_sample* sample, const double* memory,
-                  const effect_direction* direction, double* slope) {
-  (void)memory;
-  const sine_cosine at = sine_cosine_of(turned(sample, place.joint, sample->angle));
-  const double by_angle = parameters[0] * at.cosine - parameters[1] * at.sine;
-  add_to_joints(sample, place.joint, by_angle * turned(sample, place.joint, direction->angle), slope);
+static void slope(const extension_row* row, const effect_sample* sample, const effect_direction* direction,
+                  double* slope) {
+  const size_t link = row->place.joint;
+  const sine_cosine at = sine_cosine_of(turned(sample, link, sample->angle));
+  const double by_angle = row->parameters[0] * at.cosine - row->parameters[1] * at.sine;
+  add_to_joints(sample, link, by_angle * turned(sample, link, direction->angle), slope);
 }
 
-const effect_type effect_gravity = {
-    GRAVITY_FACTS,
-    .kind = EFFECT_TORQUE,
-    .torque = torque,
-    .slope = slope,
-};
+const effect_action gravity_action = {.kind = EFFECT_TORQUE, .torque = torque, .slope = slope};

@@ -8,84 +8,74 @@
 
 enum { VELOCITY, ACCELERATION, STEP, NUMBERS_REMEMBERED }; /* STEP: 0 at the first sample */
 
-static void advance(effect_place place, const double* parameters, const effect_sample* sample, const double* before,
-                    double* after) {
-  (void)parameters;
-  const double velocity = sample->velocity[place.joint];
-  after[ACCELERATION] = sample->first ? 0.0 : (velocity - before[VELOCITY]) / sample->step;
-  after[STEP] = sample->first ? 0.0 : sample->step;
-  after[VELOCITY] = velocity;
+static void advance(const extension_row* row, const effect_sample* sample) {
+  const double velocity = sample->velocity[row->place.joint];
+  row->now[ACCELERATION] = sample->first ? 0.0 : (velocity - row->before[VELOCITY]) / sample->step;
+  row->now[STEP] = sample->first ? 0.0 : sample->step;
+  row->now[VELOCITY] = velocity;
 }
 
-static void constant_torque(effect_place place, const double* parameters, const effect_sample* sample,
-                            const double* memory, double* torque) {
+static void constant_torque(const extension_row* row, const effect_sample* sample, double* torque) {
   (void)sample;
-  torque[place.joint] += parameters[0] * memory[ACCELERATION];
+  torque[row->place.joint] += row->parameters[0] * row->now[ACCELERATION];
 }
 
-static void constant_slope(effect_place place, const double* parameters, const effect_sample* sample,
-                           const double* memory, const effect_direction* direction, double* slope) {
+static void constant_slope(const extension_row* row, const effect_sample* sample, const effect_direction* direction,
+                           double* slope) {
   (void)sample;
-  if (memory[STEP] > 0.0) {
-    slope[place.joint] += parameters[0] * direction->velocity[place.joint] / memory[STEP];
+  if (row->now[STEP] > 0.0) {
+    slope[row->place.joint] += row->parameters[0] * direction->velocity[row->place.joint] / row->now[STEP];
   }
 }
 
-const effect_type effect_inertia = {
-    INERTIA_FACTS,      .kind = EFFECT_TORQUE,     .memory_count = NUMBERS_REMEMBERED,
-    .advance = advance, .torque = constant_torque, .slope = constant_slope,
-};
+const effect_action inertia_action = {.kind = EFFECT_TORQUE,
+                                      .memory_count = NUMBERS_REMEMBERED,
+                                      .advance = advance,
+                                      .torque = constant_torque,
+                                      .slope = constant_slope};
 
 /* --- inertia_variation: what turns about a joint comes nearer to its axis as the next joint, whose axis is
  * perpendicular, turns: I = sine·sin 2q_{j+1} + cosine·cos 2q_{j+1}, beside a constant. From the energy ½·I·q̇_j²: T_j =
  * I·a_j + I'·q̇_{j+1}·q̇_j and T_{j+1} = −½·I'·q̇_j², with I' = dI/dq_{j+1} and a_j as above. */
 
 enum { SINE, COSINE };
-enum { OWN = 0, NEXT = 2, NUMBERS = 4 }; /* torques of both joints by SINE and COSINE */
 
-static void by_numbers(effect_place place, const effect_sample* sample, double a, double* torques) {
-  const sine_cosine at = sine_cosine_of(2.0 * sample->angle[place.joint + 1]);
-  const double v = sample->velocity[place.joint], w = sample->velocity[place.joint + 1];
-  torques[OWN + SINE] = at.sine * a + 2.0 * at.cosine * w * v;
-  torques[OWN + COSINE] = at.cosine * a - 2.0 * at.sine * w * v;
-  torques[NEXT + SINE] = -at.cosine * v * v;
-  torques[NEXT + COSINE] = at.sine * v * v;
+/* I and I'; I'' = −4·I */
+typedef struct variation {
+  double value, by_angle;
+} variation;
+
+static variation variation_at(const extension_row* row, const effect_sample* sample) {
+  const sine_cosine at = sine_cosine_of(2.0 * sample->angle[row->place.joint + 1]);
+  const double sine = row->parameters[SINE], cosine = row->parameters[COSINE];
+  return (variation){.value = sine * at.sine + cosine * at.cosine,
+                     .by_angle = 2.0 * (sine * at.cosine - cosine * at.sine)};
 }
 
-/* Their derivative along a direction in which the acceleration a of the sample changes by a_slope. */
-static void slope_by_numbers(effect_place place, const effect_sample* sample, double a, double a_slope,
-                             const effect_direction* direction, double* after) {
-  const sine_cosine at = sine_cosine_of(2.0 * sample->angle[place.joint + 1]);
-  const double v = sample->velocity[place.joint], w = sample->velocity[place.joint + 1];
-  const double v_slope = direction->velocity[place.joint], w_slope = direction->velocity[place.joint + 1];
-  const double turn = 2.0 * direction->angle[place.joint + 1], product = w_slope * v + w * v_slope;
-  after[OWN + SINE] = at.sine * (a_slope - 2.0 * w * v * turn) + at.cosine * (a * turn + 2.0 * product);
-  after[OWN + COSINE] = at.cosine * (a_slope - 2.0 * w * v * turn) - at.sine * (a * turn + 2.0 * product);
-  after[NEXT + SINE] = at.sine * v * v * turn - 2.0 * at.cosine * v * v_slope;
-  after[NEXT + COSINE] = at.cosine * v * v * turn + 2.0 * at.sine * v * v_slope;
+static void varied_torque(const extension_row* row, const effect_sample* sample, double* torque) {
+  const variation of = variation_at(row, sample);
+  const size_t j = row->place.joint;
+  const double v = sample->velocity[j], w = sample->velocity[j + 1];
+  torque[j] += of.value * row->now[ACCELERATION] + of.by_angle * w * v;
+  torque[j + 1] -= 0.5 * of.by_angle * v * v;
 }
 
-static void add_torques(effect_place place, const double* parameters, const double* by_number, double* torque) {
-  torque[place.joint] += parameters[SINE] * by_number[OWN + SINE] + parameters[COSINE] * by_number[OWN + COSINE];
-  torque[place.joint + 1] += parameters[SINE] * by_number[NEXT + SINE] + parameters[COSINE] * by_number[NEXT + COSINE];
+static void varied_slope(const extension_row* row, const effect_sample* sample, const effect_direction* direction,
+                         double* slope) {
+  const variation of = variation_at(row, sample);
+  const size_t j = row->place.joint;
+  const double v = sample->velocity[j], w = sample->velocity[j + 1];
+  const double v_slope = direction->velocity[j], w_slope = direction->velocity[j + 1];
+  const double a_slope = row->now[STEP] > 0.0 ? v_slope / row->now[STEP] : 0.0;
+  const double value_slope = of.by_angle * direction->angle[j + 1];
+  const double by_angle_slope = -4.0 * of.value * direction->angle[j + 1];
+  slope[j] += value_slope * row->now[ACCELERATION] + of.value * a_slope + by_angle_slope * w * v +
+              of.by_angle * (w_slope * v + w * v_slope);
+  slope[j + 1] -= 0.5 * by_angle_slope * v * v + of.by_angle * v * v_slope;
 }
 
-static void varied_torque(effect_place place, const double* parameters, const effect_sample* sample,
-                          const double* memory, double* torque) {
-  double by_number[NUMBERS];
-  by_numbers(place, sample, memory[ACCELERATION], by_number);
-  add_torques(place, parameters, by_number, torque);
-}
-
-static void varied_slope(effect_place place, const double* parameters, const effect_sample* sample,
-                         const double* memory, const effect_direction* direction, double* slope) {
-  double by_number[NUMBERS];
-  const double a_slope = memory[STEP] > 0.0 ? direction->velocity[place.joint] / memory[STEP] : 0.0;
-  slope_by_numbers(place, sample, memory[ACCELERATION], a_slope, direction, by_number);
-  add_torques(place, parameters, by_number, slope);
-}
-
-const effect_type effect_inertia_variation = {
-    INERTIA_VARIATION_FACTS, .kind = EFFECT_TORQUE,   .memory_count = NUMBERS_REMEMBERED,
-    .advance = advance,      .torque = varied_torque, .slope = varied_slope,
-};
+const effect_action inertia_variation_action = {.kind = EFFECT_TORQUE,
+                                                .memory_count = NUMBERS_REMEMBERED,
+                                                .advance = advance,
+                                                .torque = varied_torque,
+                                                .slope = varied_slope};

@@ -12,40 +12,42 @@ typedef struct arm_correction {
   double value, by_angle;
 } arm_correction;
 
-static void add_torque(effect_place place, arm_correction arm, const effect_sample* sample, double* torque) {
-  torque[place.joint] -= arm.value * sample->force[place.tendon];
+typedef arm_correction correction_of(const double* parameters, double angle);
+
+static void add_torque(const extension_row* row, correction_of correct, const effect_sample* sample, double* torque) {
+  const arm_correction arm = correct(row->parameters, sample->angle[row->place.joint]);
+  torque[row->place.joint] -= arm.value * sample->force[row->place.tendon];
 }
 
-static void add_slope(effect_place place, arm_correction arm, const effect_sample* sample,
+static void add_slope(const extension_row* row, correction_of correct, const effect_sample* sample,
                       const effect_direction* direction, double* slope) {
-  const double by_angle = arm.by_angle * direction->angle[place.joint];
-  slope[place.joint] -= by_angle * sample->force[place.tendon] + arm.value * direction->force[place.tendon];
+  const size_t j = row->place.joint, i = row->place.tendon;
+  const arm_correction arm = correct(row->parameters, sample->angle[j]);
+  slope[j] -= arm.by_angle * direction->angle[j] * sample->force[i] + arm.value * direction->force[i];
 }
 
-/* Torque and slope of an effect from the function that gives its correction. */
-#define BY_CORRECTION(effect, correction)                                                                   \
-  static void torque_of_##effect(effect_place place, const double* parameters, const effect_sample* sample, \
-                                 const double* memory, double* torque) {                                    \
-    (void)memory;                                                                                           \
-    add_torque(place, correction(parameters, sample->angle[place.joint]), sample, torque);                  \
-  }                                                                                                         \
-  static void slope_of_##effect(effect_place place, const double* parameters, const effect_sample* sample,  \
-                                const double* memory, const effect_direction* direction, double* slope) {   \
-    (void)memory;                                                                                           \
-    add_slope(place, correction(parameters, sample->angle[place.joint]), sample, direction, slope);         \
-  }
+/* The effect whose correction a function gives. */
+#define BY_CORRECTION(effect, correction)                                                                              \
+  static void effect##_torque(const extension_row* row, const effect_sample* sample, double* torque) {                 \
+    add_torque(row, correction, sample, torque);                                                                       \
+  }                                                                                                                    \
+  static void effect##_slope(const extension_row* row, const effect_sample* sample, const effect_direction* direction, \
+                             double* slope) {                                                                          \
+    add_slope(row, correction, sample, direction, slope);                                                              \
+  }                                                                                                                    \
+  const effect_action effect##_action = {.kind = EFFECT_TORQUE, .torque = effect##_torque, .slope = effect##_slope}
 
 static arm_correction constant(const double* parameters, double angle) {
   (void)angle;
   return (arm_correction){.value = parameters[0]};
 }
-BY_CORRECTION(moment_arm, constant)
+BY_CORRECTION(moment_arm, constant);
 
 /* as where a tendon lifts off its guide */
 static arm_correction linear(const double* parameters, double angle) {
   return (arm_correction){.value = parameters[0] * angle, .by_angle = parameters[0]};
 }
-BY_CORRECTION(moment_arm_variation, linear)
+BY_CORRECTION(moment_arm_variation, linear);
 
 enum { SINE, COSINE, TURNS };
 
@@ -57,23 +59,4 @@ static arm_correction eccentric(const double* parameters, double angle) {
       .value = parameters[SINE] * at.sine + parameters[COSINE] * at.cosine,
       .by_angle = parameters[TURNS] * (parameters[SINE] * at.cosine - parameters[COSINE] * at.sine)};
 }
-BY_CORRECTION(pulley_eccentricity, eccentric)
-
-const effect_type effect_moment_arm = {
-    MOMENT_ARM_FACTS,
-    .kind = EFFECT_TORQUE,
-    .torque = torque_of_moment_arm,
-    .slope = slope_of_moment_arm,
-};
-const effect_type effect_moment_arm_variation = {
-    MOMENT_ARM_VARIATION_FACTS,
-    .kind = EFFECT_TORQUE,
-    .torque = torque_of_moment_arm_variation,
-    .slope = slope_of_moment_arm_variation,
-};
-const effect_type effect_pulley_eccentricity = {
-    PULLEY_ECCENTRICITY_FACTS,
-    .kind = EFFECT_TORQUE,
-    .torque = torque_of_pulley_eccentricity,
-    .slope = slope_of_pulley_eccentricity,
-};
+BY_CORRECTION(pulley_eccentricity, eccentric);

@@ -64,32 +64,32 @@ static between samples_around(const double* times, size_t newest, size_t count, 
   return (between){newer, newer, 1.0, newer == newest};
 }
 
-static void signal(effect_place place, const double* values, effect_signals* signals, const double* before,
-                   double* after) {
-  (void)place;
+static void signal(const extension_row* row, effect_signals* signals) {
   if (signals->late) {
     return;
   }
   const size_t width = width_of(signals->joints, signals->tendons);
-  memcpy(after, before, state_count(signals->joints, signals->tendons, place) * sizeof(double));
-  const int forces = values[0] < 0.0;
+  const double *before = row->before, delay = row->parameters[0];
+  double* now = row->now;
+  memcpy(now, before, row->memory_count * sizeof(double));
+  const int forces = delay < 0.0;
   const int begins = signals->first || (before[FORCES] != 0.0) != forces; /* or the parameter has changed its sign */
   const size_t count_before = begins ? 0 : whole_number(before[COUNT], KEPT);
   const size_t newest = count_before ? (whole_number(before[NEWEST], KEPT - 1) + 1) % KEPT : 0;
   const size_t count = count_before < KEPT ? count_before + 1 : KEPT;
-  double *kept = after + TIMES + KEPT, *now = kept + newest * width;
+  double *kept = now + TIMES + KEPT, *own = kept + newest * width;
   const late_rows rows = rows_of(forces, signals);
-  after[NEWEST] = (double)newest;
-  after[COUNT] = (double)count;
-  after[FORCES] = forces ? 1.0 : 0.0;
-  after[TIMES + newest] = signals->time;
+  now[NEWEST] = (double)newest;
+  now[COUNT] = (double)count;
+  now[FORCES] = forces ? 1.0 : 0.0;
+  now[TIMES + newest] = signals->time;
   for (size_t r = 0, at = 0; r < 2; at += rows.count[r++]) {
     for (size_t i = 0; i < rows.count[r]; ++i) {
-      now[at + i] = rows.row[r][i];
+      own[at + i] = rows.row[r][i];
     }
   }
-  const between b = samples_around(after + TIMES, newest, count, signals->time - fabs(values[0]));
-  after[SHARE] = b.newest ? b.weight : 0.0;
+  const between b = samples_around(now + TIMES, newest, count, signals->time - fabs(delay));
+  now[SHARE] = b.newest ? b.weight : 0.0;
   for (size_t r = 0, at = 0; r < 2; at += rows.count[r++]) {
     for (size_t i = 0; i < rows.count[r]; ++i) {
       const double older = kept[b.older * width + at + i], newer = kept[b.newer * width + at + i];
@@ -98,20 +98,17 @@ static void signal(effect_place place, const double* values, effect_signals* sig
   }
 }
 
-static void signal_pass(effect_place place, const double* values, const double* memory, effect_signals* direction) {
-  (void)place;
-  (void)values;
+static void signal_pass(const extension_row* row, effect_signals* direction) {
   if (direction->late) {
     return;
   }
-  const late_rows rows = rows_of(memory[FORCES] != 0.0, direction);
+  const late_rows rows = rows_of(row->now[FORCES] != 0.0, direction);
   for (size_t r = 0; r < 2; ++r) {
     for (size_t i = 0; i < rows.count[r]; ++i) {
-      rows.row[r][i] *= memory[SHARE];
+      rows.row[r][i] *= row->now[SHARE];
     }
   }
 }
 
-const effect_type effect_time_delay = {
-    TIME_DELAY_FACTS, .kind = EFFECT_SIGNAL, .state_count = state_count, .signal = signal, .signal_pass = signal_pass,
-};
+const effect_action time_delay_action = {
+    .kind = EFFECT_SIGNAL, .state_count = state_count, .signal = signal, .signal_pass = signal_pass};

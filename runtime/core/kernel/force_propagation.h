@@ -75,7 +75,7 @@ HOT_INLINE const slot_view* view_at(tendonfmu_finger* f, const motion* m, double
 
 /* what the friction rows make of a friction value */
 HOT_INLINE quad gripped(const tendonfmu_finger* f, size_t slot, quad friction) {
-  if (!f->extensions.friction) {
+  if (!f->extensions.frictions) {
     return friction;
   }
   return quad_load(f->scratch.grip + slot) * friction;
@@ -91,7 +91,7 @@ HOT_INLINE quad acting_friction(const tendonfmu_finger* f, const motion* m, quad
 
 /* |F| of one effect at some slots for the bands, whether it acts or not */
 HOT_INLINE void keep_limit(const tendonfmu_finger* f, double* limit, size_t slot, quad magnitude) {
-  if (f->derived.settings.has_bands) {
+  if (has_option(f, MODEL_DETECTS_BY_BANDS)) {
     quad_store(limit + slot, gripped(f, slot, magnitude));
   }
 }
@@ -99,7 +99,7 @@ HOT_INLINE void keep_limit(const tendonfmu_finger* f, double* limit, size_t slot
 /* whether F of some slots is 0 without a look at the laws: nothing moves, now or before, or slides; for the
  * bands, which need |F| of what sticks, only where it can hold no joint */
 HOT_INLINE int nothing_acts(const tendonfmu_finger* f, const motion* m) {
-  const int holds = f->derived.settings.has_bands && f->derived.can_hold[m->slot / 4];
+  const int holds = has_option(f, MODEL_DETECTS_BY_BANDS) && f->derived.can_hold[m->slot / 4];
   return !(holds | quad_bits(m->moving | m->moved | slides_at(f, m->slot)));
 }
 
@@ -292,12 +292,12 @@ static int find_friction(tendonfmu_finger* f) {
     const quad sum = quad_sum_rows(load + j), joint_friction = own_friction(f, j, sum);
     quad_store(s->load + j, sum);
     const quad slips = quad_sum_rows(tendon_friction + j) + joint_friction;
-    if (d->settings.has_bands) {
+    if (has_option(f, MODEL_DETECTS_BY_BANDS)) {
       quad_store(s->slip_torque + j, slips);
     }
     quad_store(s->friction + j, slips + cover);
   }
-  if (d->settings.has_bands) {
+  if (has_option(f, MODEL_DETECTS_BY_BANDS)) {
     friction_limits(f);
   }
   return transitions;
@@ -310,13 +310,6 @@ static void remember_slots(tendonfmu_finger* f, double time) {
     const quad side = quad_with_sign(quad_set(1.0), quad_load(f->scratch.velocity + slot));
     quad_store(s->side + slot, quad_select(moves, side, quad_load(s->side + slot)));
     quad_store(s->last_stuck + slot, quad_select(moves, quad_load(s->last_stuck + slot), quad_set(time)));
-  }
-}
-
-static void restart_rests(tendonfmu_finger* f, double time) {
-  for (size_t slot = 0; slot < f->slots; slot += QUAD_LANES) {
-    const quad since = quad_load(f->remembered.stuck_since + slot);
-    quad_store(f->remembered.stuck_since + slot, quad_select(moved_before(f, slot), since, quad_set(time)));
   }
 }
 
@@ -371,5 +364,5 @@ static void one_minus_exponentials(const double* x, double* values, size_t count
 #define STEP_KERNEL(name)                                                                                \
   {                                                                                                      \
     name, one_minus_exponentials, multiply, tendon_velocities, watch_tendons, follow_bands, weigh_bands, \
-        find_friction, remember_slots, restart_rests                                                     \
+        find_friction, remember_slots                                                                    \
   }

@@ -34,8 +34,6 @@ struct step_kernel {
   int (*find_friction)(tendonfmu_finger* finger);
   /* Fig. 5 for every slot, after its transitions: the side of what moves, the time of what rests */
   void (*remember_slots)(tendonfmu_finger* finger, double time);
-  /* and in contact: what rests counts as having come to rest just now */
-  void (*restart_rests)(tendonfmu_finger* finger, double time);
 };
 
 extern const step_kernel step_plain;
