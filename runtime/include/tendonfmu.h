@@ -102,7 +102,7 @@ const char* tendonfmu_last_error(const tendonfmu_finger* finger);
 
 /* Inputs of one sample, or of many (tendonfmu_run): row-major [samples × m] or [samples × n].
  * joint_position may be NULL for source 1, joint_velocity for sources 1 and 2, tendon_position for 2 and 3 without
- * contact.rest and sensor_fault. */
+ * sensor_fault. */
 typedef struct tendonfmu_inputs {
   const double* tendon_force;    /* [m] N    f0, tension at the spring; negative only on bidirectional tendons */
   const double* tendon_position; /* [m] m    x0, motor side */
