@@ -139,7 +139,7 @@ void expect_near(const PerJoint& found, const PerJoint& expected, double toleran
 
 // One of each, at each kind of place that it has.
 std::vector<Effect> all_torques() {
-  return {{"cover_hardening", 3, 0, {0.3}},
+  return {{"cover_hardening", 3, 0, {0.3, -0.2}},
           {"gravity", 3, 0, {0.02, -0.03}},
           {"gravity", 1, 0, {0.02, -0.03}},
           {"inertia", 2, 0, {2e-4}},
