@@ -18,6 +18,7 @@ from tendonfmu.model import Finger, finger_from_data, read_finger, tendon_positi
 from tendonfmu.options import CalibrateOptions
 from tendonfmu.recordings import Recording, belongs, learn_routing, read_recording, routed
 from tendonfmu.recordings.faults import tendon_angles
+from tendonfmu.recordings.routing import is_creep
 
 INDEX = ROOT / "examples" / "fingers" / "index_finger.json"
 FREE = ROOT / "examples" / "demo_recording" / "index_finger_free.parquet"
@@ -137,6 +138,14 @@ def test_a_cord_that_creeps_has_no_other_zero(seconds: float) -> None:
             stiffness.append(abs(1.05 * each.stiffness.value / each.stiffness.described - 1.0))
             zeros.append(abs(each.zero.off))
     assert max(stiffness) < 0.01 and max(zeros) < 20e-6  # without regard to it: 0.047 and 183e-6
+
+
+def test_slow_stretches_that_cancel_are_no_creep() -> None:
+    """Shares of the stretch within 1, 3 and 10 s: of cords that creep, and of elastic ones that only seem to."""
+    for parts in ([0.009, 0.024, 0.019], [-0.006, 0.034, 0.019], [0.053, -0.015, 0.008]):
+        assert is_creep(np.array(parts))
+    for parts in ([0.65, -0.48, -0.02], [0.37, -0.11, -0.17], [0.04, 0.02, -0.06], [-0.01, -0.03, -0.02]):
+        assert not is_creep(np.array(parts))
 
 
 def test_springs_and_play_that_are_described_are_not_off() -> None:

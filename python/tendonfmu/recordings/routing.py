@@ -339,6 +339,11 @@ def smooth_speeds(time: Numbers, values: Numbers) -> Numbers:
     return speeds
 
 
+def is_creep(parts: Numbers) -> bool:
+    """Return whether slow stretches [times] can be those of a cord: above 0 but for their errors."""
+    return bool(np.abs(parts).sum() < CANCEL * parts.sum())
+
+
 def _behind(time: Numbers, force: Numbers) -> Numbers:
     """Return how far the slow stretches of the cords are behind the forces [N, m, times], N; none after a gap."""
     behind = np.zeros((*force.shape, len(CREEP)))
@@ -418,7 +423,7 @@ def _of_tendon(
         one, whole = (regression(own, lacking, each) for each in (behind[:, [len(CREEP) // 2]], behind))
         slow, half, _ = one.difference(at) if one is not None else (0.0, 0.0, 1.0)
         parts = whole.value[at : at + len(CREEP)] if whole is not None else np.zeros(1)
-        creeps = slow > CERTAIN * half and np.abs(parts).sum() < CANCEL * parts.sum()
+        creeps = slow > CERTAIN * half and is_creep(parts)
         found = whole if creeps else found
     behind = behind if creeps else behind[:, :0]
     if found is None:
