@@ -25,6 +25,9 @@ from tendonfmu.statistics import Interval
 def test_a_memory_with_many_rows_has_a_range_of_each_unit() -> None:
     many = [(3e-4, "m"), (1e-4, "m"), (0.02, "rad"), (2e-4, "m")]
     assert presliding({"displacement": many}).replace("\xa0", " ") == "over 0.1 mm to 0.3 mm and 20 mrad"
+    at_once = [(1e-10, "m"), (1.7e-4, "m"), (1e-7, "rad"), (2e-8, "rad")]
+    words = presliding({"displacement": at_once}).replace("\xa0", " ")
+    assert words == "over less than 1 µm to 0.17 mm and less than 0.1 mrad"
     assert presliding({"stiffness": [(4e3, "N/m")] * 2}).replace("\xa0", " ") == "a stiffness of 4·10³ N/m"
 
 

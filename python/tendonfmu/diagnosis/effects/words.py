@@ -14,6 +14,7 @@ Words = Callable[[Sizes], str]
 NBSP = "\u00a0"
 _PREFIXED = ("m", "N.m", "N", "s", "rad", "m/s", "rad/s", "m/rad", "N.m/rad", "N.m.s/rad")
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_LEAST_TRAVEL = {"m": 1e-6, "rad": 1e-4}  # that a hand's sensors show
 _STEPS = ((0.1, 1.0, ""), (1e-4, 1e3, "m"), (0.0, 1e6, "µ"))  # least magnitude, factor, prefix
 
 
@@ -38,8 +39,13 @@ def presliding(numbers: Sizes) -> str:
     of_unit: dict[str, list[float]] = {}
     for value, unit in numbers[name]:
         of_unit.setdefault(unit, []).append(value)
-    ranges = [dict.fromkeys(quantity(end, unit) for end in (min(own), max(own))) for unit, own in of_unit.items()]
+    ranges = [dict.fromkeys(_travel(end, unit) for end in (min(own), max(own))) for unit, own in of_unit.items()]
     return text.format(" and ".join(" to ".join(ends) for ends in ranges))
+
+
+def _travel(value: float, unit: str) -> str:
+    least = _LEAST_TRAVEL.get(unit, 0.0)
+    return f"less than {quantity(least, unit)}" if value < least else quantity(value, unit)
 
 
 def _one(numbers: Sizes, name: str) -> tuple[float, str]:
