@@ -151,7 +151,7 @@ def sentence(report: TuneReport) -> str:
     alarms = "none" if found["alarms"] == 0 else f"{found['alarms']}"
     pushed, joint = least_sensitive(report["joints"], pushes["torque"])
     ending = f"{joint} are found within {1e3 * pushes['within_s']:.0f} ms, nine of ten."
-    sized = "No pushes at" if pushed is None else f"Pushes of more than {1e3 * pushed:.2g} mN·m at"
+    sized = "No pushes at" if pushed is None else f"Pushes of more than {1e3 * pushed:.3g} mN·m at"
     return (
         f"At most {report['false_alarms_per_hour']:g} alarms an hour were asked for; {alarms} in {long} of motion that "
         f"was kept out. {sized} {ending}"

@@ -221,7 +221,7 @@ def _event(series: Series, left: Numbers, inside: Flags, rows: NDArray[np.int64]
     names = " and ".join(str(joint + 1) for joint in joints)
     plural = "s" if len(joints) > 1 else ""
     description = (
-        f"{end - start:.2g} s at joint{plural} {names}, up to {1000.0 * peak:.2g} mN·m that neither motion nor force "
+        f"{end - start:.2g} s at joint{plural} {names}, up to {1000.0 * peak:.3g} mN·m that neither motion nor force "
         f"explains{_circumstances(series, own, strongest)}"
     )
     name = recordings[int(series.recording[rows[0]])]

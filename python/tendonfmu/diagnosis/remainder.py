@@ -214,7 +214,7 @@ def _what(findings: Sequence[Finding]) -> Iterator[str]:
     """Yield what each finding follows; all oscillations are listed together, at the first one."""
     lines = [finding.line for finding in findings if finding.line is not None]
     frequencies = listed([f"{line.frequency:.3g}" for line in lines])
-    sizes = listed([f"{1000.0 * line.amplitude:.2g}" for line in lines])
+    sizes = listed([f"{1000.0 * line.amplitude:.3g}" for line in lines])
     steady = "a steady oscillation" if len(lines) == 1 else "steady oscillations"
     for finding in findings:
         if finding.line is not None:

@@ -425,7 +425,7 @@ def tune_tables(report: TuneReport) -> Iterator[Table]:
             (
                 f"{each['mean_force']:.3g}",
                 f"{each['minutes']:.1f}",
-                ", ".join(f"{1e3 * value:.2g}" for value in each["free_rms"]),
+                ", ".join(f"{1e3 * value:.3g}" for value in each["free_rms"]),
             )
             for each in report["pretensions"]
         ],
