@@ -40,6 +40,8 @@ def test_a_cover_hardens_about_an_angle_of_its_own() -> None:
     words = by_name("cover_hardening").size
     numbers = {"stiffness": [(0.2, "N.m/rad3")], "quadratic": [(0.03, "N.m/rad2")]}
     assert words(numbers).replace("\xa0", " ") == "a cubic spring of 0.2 N·m/rad³ about −50 mrad from its rest angle"
+    numbers["quadratic"] = [(1e-18, "N.m/rad2")]
+    assert words(numbers) == words({"stiffness": numbers["stiffness"]})
     assert words({"stiffness": numbers["stiffness"]}).replace("\xa0", " ") == "a cubic spring of 0.2 N·m/rad³"
 
 
@@ -84,7 +86,7 @@ def test_a_refused_cause_has_the_gain_of_its_fit(monkeypatch: pytest.MonkeyPatch
     search.refused, search._answered, search._least_gain, search.of_memory = [], set(), 0.03, 0.0
     for model, gain in ((cast("Any", object()), 0.01), (None, 0.07)):
         trial = search_module.Trial(promised, model, 0.99**2 * before)
-        search._best_fitted = lambda *_, trial=trial: trial  # type: ignore[method-assign]
+        monkeypatch.setattr(search, "_best_fitted", lambda *_, trial=trial: trial)
         refused = search._try_next(set())
         assert refused is not None and not refused[1] and refused[0].gain.value == pytest.approx(gain)
 
@@ -103,7 +105,7 @@ def test_the_last_check_compares_with_all_that_the_memory_explains(monkeypatch: 
     assert bench.shares_of_memory(models["full"], without) == [np.inf, np.inf], "no memory"
 
 
-def test_a_part_of_the_memory_that_is_not_certain_stays_in_presliding() -> None:
+def test_a_part_of_the_memory_that_is_not_certain_stays_in_presliding(monkeypatch: pytest.MonkeyPatch) -> None:
     """Presliding alone is uncertain; with relaxation in it, it is certain. What gains nothing is weak as before."""
     element, cord = {"effect": "presliding", "displacement": 0.1}, {"effect": "cord_stretch", "stiffness": 1e4}
     relaxing = {**element, "relaxation_time": 0.5}
@@ -111,13 +113,13 @@ def test_a_part_of_the_memory_that_is_not_certain_stays_in_presliding() -> None:
     given = [Judged(Where(name), (MemoryTerm(by_name(name), Place(), rows=own),)) for name, own in rows.items()]
     bench = whole._Bench.__new__(whole._Bench)
     bench._found = cast("Any", SimpleNamespace(base=SimpleNamespace(least=SimpleNamespace(shows_all=lambda *_: True))))
-    bench.fit = lambda causes: cast("Any", SimpleNamespace(data=None))  # type: ignore[method-assign]
-    bench.each_without = lambda causes: [bench.fit(causes)] * len(causes)  # type: ignore[method-assign]
-    bench.shares_of_memory = lambda fit, without: [1.0] * len(without)  # type: ignore[method-assign]
+    monkeypatch.setattr(bench, "fit", lambda causes: SimpleNamespace(data=None))
+    monkeypatch.setattr(bench, "each_without", lambda causes: [bench.fit(causes)] * len(causes))
+    monkeypatch.setattr(bench, "shares_of_memory", lambda fit, without: [1.0] * len(without))
     gains = {"presliding": Interval(0.4, 0.2, 0.6), "relaxation": Interval(0.08, -0.02, 0.2)}
     for of_cords, names in ((0.08, ["presliding"]), (0.01, ["presliding", "cord_stretch"])):
         gains["cord_stretch"] = Interval(of_cords, -0.1, 0.2)
-        bench.with_gain = lambda cause, *_: replace(cause, gain=gains[cause.effect])  # type: ignore[method-assign]
+        monkeypatch.setattr(bench, "with_gain", lambda cause, *_: replace(cause, gain=gains[cause.effect]))
         causes, weak = bench.judged(0.03, given)
         assert [cause.effect for cause in causes] == names and [causes[k].effect for k in weak] == names[1:]
         ((term,), *_) = (cause.terms for cause in causes)

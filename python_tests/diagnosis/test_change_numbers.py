@@ -23,6 +23,7 @@ from tendonfmu.diagnosis.candidate_columns import (
     numbers_of,
     with_numbers,
 )
+from tendonfmu.diagnosis.change_diagnosis import _main
 from tendonfmu.diagnosis.effects.mechanism import data_number
 from tendonfmu.report.diagnosis_types import EFFECTS
 from worn_finger import described
@@ -172,3 +173,9 @@ def test_what_is_added_stays_in_the_box() -> None:
     for sign in (1.0, -1.0):
         for each in numbers_of(with_numbers(data, sign * np.full(len(numbers), 1e6))):
             assert each.low <= each.value <= each.high
+
+
+def test_a_new_cover_that_hardens_is_as_large_as_its_cubic_spring() -> None:
+    """Its other number, of another unit, says about which angle."""
+    now = {"extensions": [{"effect": "cover_hardening", "joint": 1, "stiffness": 0.05, "quadratic": 0.3}]}
+    assert _main(["extensions[1].stiffness", "extensions[1].quadratic"], now) == ["extensions[1].stiffness"]

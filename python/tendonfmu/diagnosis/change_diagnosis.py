@@ -52,7 +52,7 @@ SPREAD = 2.0  # standard deviations over the stretches of the reference: other m
 FEWEST = 4  # least number of stretches on either side
 LEAST_OF_NOW = 0.05  # of the present value: a change from a smaller number is not reported as a share of it
 # numbers that say of which form a term is, not how large it is
-_FORM = ("stribeck_velocity", "beyond", "turns", "time_constant", "reaction", "rest_angle", "displacement")
+_FORM = ("stribeck_velocity", "beyond", "turns", "time_constant", "reaction", "rest_angle", "quadratic", "displacement")
 REPEAT = "Repeat the motions of the reference exactly, at the same load and pretension."
 
 

@@ -101,8 +101,8 @@ def per_force(whose: str) -> Words:
 def hardening(numbers: Sizes) -> str:
     """Return the cubic spring, and how far from the described rest angle it hardens alike to both sides."""
     (stiffness, unit), (quadratic, _) = _one(numbers, "stiffness"), numbers.get("quadratic", [(0.0, "")])[0]
-    centre = -quadratic / (3.0 * stiffness) if stiffness else 0.0
-    about = f" about {quantity(centre, 'rad', sign=True)} from its rest angle" if quadratic else ""
+    centre = round(-quadratic / (3.0 * stiffness), 6) if stiffness else 0.0  # a fit leaves 1e-18 of 0
+    about = f" about {quantity(centre, 'rad', sign=True)} from its rest angle" if centre else ""
     return f"a cubic spring of {quantity(stiffness, unit)}{about}"
 
 
