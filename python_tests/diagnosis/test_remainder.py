@@ -33,6 +33,11 @@ def product(series: Series) -> Numbers:
     return np.asarray(np.sin(1.3 * one) * np.cos(1.1 * other))
 
 
+def cogging(series: Series) -> Numbers:
+    angle = series.angle[:, 1]
+    return np.asarray(np.sin(2.0 * np.pi * 6.0 * angle / np.ptp(angle)))
+
+
 def creep(series: Series) -> Numbers:
     return np.asarray(series.angle[:, 0] - low_passed(series.angle[:, 0], 2.0))
 
@@ -58,11 +63,12 @@ def test_noise_is_not_unknown(seed: int) -> None:
         [
             (rubbing, 1.0, {"rubbing", "tendon", "velocity"}),
             (product, 1.0, {"angle"}),
+            (cogging, 1.0, {"angle"}),
             (creep, 2.0, {"memory of angle"}),
             (memory, 4.0, {"memory of speed"}),
             (oscillation, 0.3, {"line"}),
         ],
-        2,
+        3,
     ),
 )
 def test_finds_what_no_candidate_is(signal: Callable[[Series], Numbers], strength: float, groups: set[str]) -> None:

@@ -74,6 +74,7 @@ def _in_ranges(values: Numbers) -> Numbers:
 MEMORY = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)  # s: time constants of what friction may remember
 TRAVELS = (0.03, 0.1, 0.3, 1.0)  # scales of presliding, of the median stroke
 MOST_PAIRS = 30  # of tendons: those with neighbouring numbers first
+RIPPLES = 24  # knots of a curve over the angle: teeth and poles ripple several times within a stroke
 RANDOM = 100  # columns of random functions of two or three states
 MOVING = 0.03  # of the 95 % quantile of a speed: slower motion counts as rest
 
@@ -258,7 +259,7 @@ def _of_angles(series: Series, states: _States) -> _Made:
     joints = series.angle.shape[1]
     for joint in range(joints):
         curve = _spline(series.angle[:, joint], 8)
-        yield "angle", _joint(joint), curve
+        yield "angle", _joint(joint), _spline(series.angle[:, joint], RIPPLES)
         both = (states.side[:, joint, None], states.moving[:, joint, None])
         yield "friction over angle", _joint(joint), np.concatenate([curve * side for side in both], axis=1)
     for one, two in permutations(range(joints), 2):
