@@ -155,20 +155,40 @@ def test_no_more_tendons_than_joints_tell_no_delay(sound: FitRecording) -> None:
     assert Positions(described(data), [encoders]).delay == pytest.approx(0.0, abs=5e-4), "encoders tell it"
 
 
-def test_described_springs_that_are_not_linear_hide_no_delay() -> None:
+HARDENING, LATE = 4e5, 4  # N/m², samples
+BENT = [{"effect": "tendon_nonlinearity", "tendon": i, "hardening": HARDENING} for i in range(1, 5)]
+
+
+@pytest.fixture(scope="module")
+def bent() -> FitRecording:
+    made = recorded(finger(), 23, 1, 20.0, LATE)
+    force = np.roll(made.recording.groups["tendon_force"], -LATE, axis=0)
+    bent = 2.0 * force / (STIFFNESS + np.sqrt(STIFFNESS**2 + 4.0 * HARDENING * force)) - force / STIFFNESS
+    return made.with_groups(tendon_position=made.recording.groups["tendon_position"] + bent)
+
+
+def test_described_springs_that_are_not_linear_hide_no_delay(bent: FitRecording) -> None:
     """Taken for linear, they leave too much in the equation to tell it."""
-    hardening, samples = 4e5, 4
-    made = recorded(finger(), 23, 1, 20.0, samples)
-    force = np.roll(made.recording.groups["tendon_force"], -samples, axis=0)
-    bent = 2.0 * force / (STIFFNESS + np.sqrt(STIFFNESS**2 + 4.0 * hardening * force)) - force / STIFFNESS
-    bent = made.with_groups(tendon_position=made.recording.groups["tendon_position"] + bent)
-    rows = [{"effect": "tendon_nonlinearity", "tendon": i, "hardening": hardening} for i in range(1, 5)]
-    shown = Positions(described(finger() | {"extensions": rows}), [bent])
-    assert shown.delay == pytest.approx(samples / RATE, abs=5e-4)
+    shown = Positions(described(finger() | {"extensions": BENT}), [bent])
+    assert shown.delay == pytest.approx(LATE / RATE, abs=5e-4)
     assert Positions(described(finger()), [bent]).delay is None
-    (flags,) = [bent.train]
-    assert shown.gain([(bent, flags)], samples / RATE, 0).low > 0.5
-    assert shown.gain([(bent, flags)], -samples / RATE, 0).high < 0.0
+    assert shown.gain([(bent, bent.train)], LATE / RATE, 0).low > 0.5
+    assert shown.gain([(bent, bent.train)], -LATE / RATE, 0).high < 0.0
+
+
+@pytest.mark.parametrize("row", [BENT[1], {"effect": "backlash", "tendon": 2, "width": 2e-4}], ids=str)
+def test_tendons_contradict_a_spring_and_a_play_that_are_not_there(
+    row: dict[str, Any], sound: FitRecording, bent: FitRecording
+) -> None:
+    linear, other = finger(), finger() | {"extensions": [row]}
+    assert Positions(described(linear), [sound]).contradict(linear, other)
+    assert not Positions(described(linear), [sound]).contradict(other, linear)
+    if row in BENT:
+        assert not Positions(described(linear), [bent]).contradict(linear, other)
+    few = {name: values[:, 1:3] for name, values in sound.recording.groups.items() if "tendon" in name}
+    alone = replace(sound, recording=replace(sound.recording, groups=few))
+    data = [each | {"tendons": each["tendons"][1:3]} for each in (linear, other)]
+    assert not Positions(described(data[0]), [alone]).contradict(*data), "two tendons of two joints cannot know"
 
 
 def found_base(truth: Mapping[str, Any], seed: int, source: int, delay: int = 0) -> Any:

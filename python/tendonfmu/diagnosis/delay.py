@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from tendonfmu.arrays import Flags, Numbers
+from tendonfmu.arrays import Data, Flags, Numbers
 from tendonfmu.diagnosis.effects import Place, Term, by_name
 from tendonfmu.diagnosis.extension_fit import FittedModel
 from tendonfmu.diagnosis.samples import Samples, shifted
@@ -61,8 +61,17 @@ class Positions:
         self._measured = all("joint_position" in own for own in groups)
         self._apart = np.eye(len(self._arms)) - (0.0 if self._measured else self._arms @ np.linalg.pinv(self._arms))
         tells = all("tendon_position" in own for own in groups) and np.linalg.matrix_rank(self._apart) > 0
+        self._recordings = recordings if tells else ()
         # s, with its standard error; None: they do not show whether there is one
         self.delay, self.error = self._found(recordings) if tells else (None, np.nan)
+
+    def contradict(self, before: Data, after: Data) -> bool:
+        """Return whether they agree worse with the springs and plays of one description than with those before."""
+        errors = []
+        for data in (before, after):
+            finger, late = self._finger.with_data(data), np.array([self.delay or 0.0])
+            errors.append(sum(float(self._squares(one, one.train, late, finger).sum()) for one in self._recordings))
+        return errors[1] > errors[0]
 
     def gain(self, judged: Iterable[tuple[FitRecording, Flags]], delay: float, seed: int) -> Interval:
         """Return which share of the rms that their equation leaves of some samples a delay removes."""
@@ -82,11 +91,13 @@ class Positions:
         # jackknife (Efron and Stein, Ann. Statist. 9, 1981)
         return float(found), float(np.std(others) * np.sqrt(len(others) - 1))
 
-    def _squares(self, recording: FitRecording, chosen: Flags, delays: Numbers) -> Numbers:
+    def _squares(
+        self, recording: FitRecording, chosen: Flags, delays: Numbers, springs: Finger | None = None
+    ) -> Numbers:
         """Return by block of the chosen samples the sum of squares that the equation leaves (m²) [K, delays]."""
         groups, index = recording.recording.groups, blocks_of(recording.time, chosen)
         position = groups["tendon_position"] - (groups["joint_position"] @ self._arms.T if self._measured else 0.0)
-        linear = with_linear_springs(self._finger, recording.recording).groups["tendon_position"]
+        linear = with_linear_springs(springs or self._finger, recording.recording).groups["tendon_position"]
         stretch = groups["tendon_force"] / self._stiffness + (groups["tendon_position"] - linear)
         sums, squares = [], np.zeros(len(recording.time))
         for delay in delays.tolist():

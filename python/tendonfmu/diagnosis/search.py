@@ -51,6 +51,7 @@ from tendonfmu.diagnosis.selection import (
 from tendonfmu.diagnosis.view import View
 from tendonfmu.estimate import SCALING
 from tendonfmu.model import Finger, moment_arms
+from tendonfmu.recordings import BENDING
 from tendonfmu.statistics import Interval
 from tendonfmu.tasks import Phases, Step
 
@@ -301,7 +302,8 @@ class ExtensionSearch(CauseSearch):
         predicted = base.samples.at_predicted_forces(begin)
         model = fit_extended(base.nominal, terms, predicted, base.settings, self.model, rough=True)
         model = refitted(model, base.samples, base.settings, rough=True)
-        if not base.least.shows_all(cause.effect, cause.terms, model.data):
+        shown = base.least.shows_all(cause.effect, cause.terms, model.data)
+        if not shown or (cause.effect in BENDING and base.positions.contradict(self.model.data, model.data)):
             return Trial(cause, None, np.array([np.inf]))
         return Trial(cause, model, base.left_unseen(model))
 

@@ -54,7 +54,7 @@ if TYPE_CHECKING:
         read_recording,
         read_recordings,
     )
-    from .residuals import Model, consistency, delayed_torque, rms, run_parts, whiteness, with_linear_springs
+    from .residuals import BENDING, Model, consistency, delayed_torque, rms, run_parts, whiteness, with_linear_springs
     from .routing import (
         Learned,
         TendonRouting,
