@@ -14,21 +14,32 @@ from tendonfmu.diagnosis import extension_diagnosis as whole
 from tendonfmu.diagnosis import search as search_module
 from tendonfmu.diagnosis.answer import not_taken
 from tendonfmu.diagnosis.effects import Place, Term, Where, by_name
+from tendonfmu.diagnosis.effects.mechanism import Sizes
 from tendonfmu.diagnosis.effects.words import presliding
-from tendonfmu.diagnosis.extension_fit import MemoryTerm
+from tendonfmu.diagnosis.extension_fit import Row, memory_terms
 from tendonfmu.diagnosis.result import Cause
-from tendonfmu.diagnosis.search import FORM, ExtensionSearch
+from tendonfmu.diagnosis.search import FORM, ExtensionSearch, _of_start
 from tendonfmu.diagnosis.selection import Judged, names_needed
 from tendonfmu.statistics import Interval
 
 
 def test_a_memory_with_many_rows_has_a_range_of_each_unit() -> None:
     many = [(3e-4, "m"), (1e-4, "m"), (0.02, "rad"), (2e-4, "m")]
-    assert presliding({"displacement": many}).replace("\xa0", " ") == "over 0.1 mm to 0.3 mm and 20 mrad"
+    assert words_of({"displacement": many}) == "over 0.1 mm to 0.3 mm at tendons, 20 mrad at joints"
     at_once = [(1e-10, "m"), (1.7e-4, "m"), (1e-7, "rad"), (2e-8, "rad")]
-    words = presliding({"displacement": at_once}).replace("\xa0", " ")
-    assert words == "over less than 1 µm to 0.17 mm and less than 0.1 mrad"
-    assert presliding({"stiffness": [(4e3, "N/m")] * 2}).replace("\xa0", " ") == "a stiffness of 4·10³ N/m"
+    assert (
+        words_of({"displacement": at_once}) == "over less than 1 µm to 0.17 mm at tendons, less than 0.1 mrad at joints"
+    )
+    assert words_of({"stiffness": [(4e3, "N/m")] * 2}) == "a stiffness of 4·10³ N/m at tendons"
+    rigid = {"stiffness": [(4e3, "N/m"), (1e12, "N/m"), (2e3, "N.m/rad")], "cords": [(2e4, "N/m")]}
+    words = "a stiffness of 4·10³ N/m to more than 1·10⁶ N/m at tendons, more than 50 N·m/rad at joints"
+    assert words_of(rigid) == f"{words}, along cords of 2·10⁴ N/m"
+    relaxing = {"displacement": [(1e-4, "m")], "relaxation_time": [(0.5, "s")]}
+    assert words_of(relaxing) == "over 0.1 mm at tendons, fading within 0.5 s at rest"
+
+
+def words_of(numbers: Sizes) -> str:
+    return presliding(numbers).replace("\xa0", " ")
 
 
 def test_a_reaction_that_a_fit_left_at_zero_is_zero() -> None:
@@ -105,27 +116,31 @@ def test_the_last_check_compares_with_all_that_the_memory_explains(monkeypatch: 
     assert bench.shares_of_memory(models["full"], without) == [np.inf, np.inf], "no memory"
 
 
-def test_a_part_of_the_memory_that_is_not_certain_stays_in_presliding(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Presliding alone is uncertain; with relaxation in it, it is certain. What gains nothing is weak as before."""
-    element, cord = {"effect": "presliding", "displacement": 0.1}, {"effect": "cord_stretch", "stiffness": 1e4}
-    relaxing = {**element, "relaxation_time": 0.5}
-    rows = {"presliding": (element,), "relaxation": (relaxing,), "cord_stretch": (cord,)}
-    given = [Judged(Where(name), (MemoryTerm(by_name(name), Place(), rows=own),)) for name, own in rows.items()]
-    bench = whole._Bench.__new__(whole._Bench)
-    bench._found = cast("Any", SimpleNamespace(base=SimpleNamespace(least=SimpleNamespace(shows_all=lambda *_: True))))
-    monkeypatch.setattr(bench, "fit", lambda causes: SimpleNamespace(data=None))
-    monkeypatch.setattr(bench, "each_without", lambda causes: [bench.fit(causes)] * len(causes))
-    monkeypatch.setattr(bench, "shares_of_memory", lambda fit, without: [1.0] * len(without))
-    gains = {"presliding": Interval(0.4, 0.2, 0.6), "relaxation": Interval(0.08, -0.02, 0.2)}
-    for of_cords, names in ((0.08, ["presliding"]), (0.01, ["presliding", "cord_stretch"])):
-        gains["cord_stretch"] = Interval(of_cords, -0.1, 0.2)
-        monkeypatch.setattr(bench, "with_gain", lambda cause, *_: replace(cause, gain=gains[cause.effect]))
-        causes, weak = bench.judged(0.03, given)
-        assert [cause.effect for cause in causes] == names and [causes[k].effect for k in weak] == names[1:]
-        ((term,), *_) = (cause.terms for cause in causes)
-        assert term.added_to({})["extensions"] == [relaxing, cord][: 3 - len(names)]
-    assert whole.remembered(given[1:], given[1]) is None, "described presliding"
-    assert whole.remembered(given, Judged(Where("gravity", 1))) is None
+ELEMENT, CORD = {"effect": "presliding", "displacement": 0.1}, {"effect": "cord_stretch", "stiffness": 1e4}
+RELAXING = {**ELEMENT, "relaxation_time": 0.5}
+
+
+@pytest.mark.parametrize(
+    ("given", "chosen", "causes"),
+    [
+        ((), (RELAXING, CORD), {"presliding": ["relaxation", "cord_stretch"]}),
+        (({**ELEMENT, "joint": 1},), (ELEMENT, CORD), {"presliding": ["cord_stretch"]}),
+        ((ELEMENT,), (RELAXING, CORD), {"relaxation": [], "cord_stretch": ["presliding"]}),
+        ((ELEMENT, CORD), (RELAXING, CORD), {"relaxation": []}),
+        ((), (), {}),
+    ],
+)
+def test_a_memory_that_is_new_is_one_cause(
+    given: tuple[Row, ...], chosen: tuple[Row, ...], causes: dict[str, list[str]]
+) -> None:
+    """A part of it that a described one lacks has a name of its own. What looks like another form may be one."""
+    other = {"effect": "time_delay", "delay": 0.001}
+    data: dict[str, Any] = {"extensions": [other, *map(dict, given)]}
+    found = [_of_start(terms) for terms in memory_terms(data, chosen)]
+    assert {cause.effect: [rival.effect for rival in cause.alike] for cause in found} == causes
+    for cause in found:
+        data = cause.terms[0].added_to(data)
+    assert data["extensions"] == [other, *chosen]
 
 
 def test_only_laws_of_the_nominal_description_are_asked_about(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from .contact_scan import events_of, without_events
     from .diagnosis import diagnose
     from .effects.mechanism import Where
-    from .effects.places import thresholds
     from .effects.table import CONTACT, UNKNOWN, ZERO, title_of
     from .effects.words import NBSP, quantity
     from .extension_fit import FitSettings, with_known

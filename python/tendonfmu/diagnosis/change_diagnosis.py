@@ -23,7 +23,6 @@ from tendonfmu.diagnosis.change_search import ChangeSearch, interval_of
 from tendonfmu.diagnosis.contact_scan import event_gain, events_of, unusual, without_events
 from tendonfmu.diagnosis.effects import Place, Where
 from tendonfmu.diagnosis.effects.mechanism import data_number
-from tendonfmu.diagnosis.effects.places import thresholds
 from tendonfmu.diagnosis.effects.words import NBSP, quantity
 from tendonfmu.diagnosis.extension_fit import added_paths, with_known
 from tendonfmu.diagnosis.gain import Gain, measure_gain
@@ -331,7 +330,7 @@ def _new_term(search: ChangeSearch, number: int, now: Data, units: Mapping[str, 
     error = abs(value) * _relative_error(change)
     size, intervals = with_error(value, error), {path: with_error(data_number(now, path), error) for path in main}
     name = "amplitude" if len(main) > 1 else main[0].rsplit(".", 1)[-1]
-    words = f"{size_of(change.effect, places, thresholds(now))}, beyond what the reference has"
+    words = f"{size_of(change.effect, places, now)}, beyond what the reference has"
     changed = ChangedSize(name, unit, Interval(0.0, 0.0, 0.0), size, size)
     return {"places": places, "changed": changed, "size": words, "intervals": intervals}
 

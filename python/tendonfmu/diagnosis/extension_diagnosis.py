@@ -15,18 +15,14 @@ from tendonfmu.diagnosis.base import Base, forgetful, refitted, remembering
 from tendonfmu.diagnosis.contact_scan import detection_gain, event_gain, events_of, without_events
 from tendonfmu.diagnosis.delay import DELAY
 from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION, Place, Term, Where
-from tendonfmu.diagnosis.effects.places import law_of, thresholds
+from tendonfmu.diagnosis.effects.places import law_of
 from tendonfmu.diagnosis.extension_fit import (
-    CORDS,
-    PRESLIDING,
-    RELAXATION,
     FittedModel,
     cause_parameters,
     fit_extended,
     intervals_of,
     memory_of,
     with_known,
-    with_part,
 )
 from tendonfmu.diagnosis.gain import Gain, Unseen, measure_gain
 from tendonfmu.diagnosis.names import size_of
@@ -87,15 +83,6 @@ def _rivals(cause: Judged, named: Collection[str]) -> tuple[Judged, ...]:
     return tuple(rivals.values())
 
 
-def remembered(causes: Sequence[Judged], part: Judged) -> list[Judged] | None:
-    """Return the causes with a part of the memory in presliding, whose name it shares; None if it is none of these."""
-    whole = next((cause for cause in causes if cause.effect == PRESLIDING), None)
-    if whole is None or part.effect not in (RELAXATION, CORDS):
-        return None
-    joined = replace(whole, terms=(with_part(whole.terms[0], part.terms[0]),))
-    return [joined if cause is whole else cause for cause in causes if cause is not part]
-
-
 class _Bench:
     """Fits of any set of causes, and what they leave of unseen data."""
 
@@ -118,10 +105,7 @@ class _Bench:
         self._order: dict[frozenset[int], list[Term]] = {next(iter(self._fits)): terms_of(found.causes)}
 
     def judged(self, least_gain: float, causes: list[Judged]) -> tuple[list[Judged], list[int]]:
-        """Return causes with their gains, and which of them are weak.
-
-        A part of the memory that is material but not certain stays in presliding: without it, that may be neither.
-        """
+        """Return causes with their gains, and which of them are weak."""
         fit, without = self.fit(causes), self.each_without(causes)
         judged = [self.with_gain(cause, model, fit) for cause, model in zip(causes, without, strict=True)]
         needed, shares = names_needed(judged), self.shares_of_memory(fit, without)
@@ -135,9 +119,6 @@ class _Bench:
                 and self._found.base.least.shows_all(cause.effect, cause.terms, fit.data)
             )
         ]
-        for part in (judged[k] for k in weak if judged[k].gain.value >= least_gain):
-            if joined := remembered(judged, part):
-                return self.judged(least_gain, joined)
         return judged, weak
 
     def verified(self, least_gain: float) -> Verified:
@@ -323,7 +304,7 @@ class Lacks:
         compared = Compared(self._series, before, after, before - after, self._series.used)
         if cause.effect == CALIBRATION:
             return reported(cause, compared, **calibrated(cause, places, verified.intervals))
-        size = size_of(cause.effect, places, thresholds(verified.extended_data))
+        size = size_of(cause.effect, places, verified.extended_data)
         return reported(cause, compared, places=places, intervals=verified.intervals, size=size)
 
     # --- what is left, and what to do next ---

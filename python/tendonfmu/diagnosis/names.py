@@ -10,10 +10,12 @@ import numpy as np
 from tendonfmu.arrays import Data
 from tendonfmu.diagnosis.contact_scan import LEVEL as SCAN_LEVEL
 from tendonfmu.diagnosis.effects import BY_NAME, Where, title_of
+from tendonfmu.diagnosis.effects.places import thresholds
 from tendonfmu.diagnosis.effects.table import CONTACT, UNKNOWN
 from tendonfmu.diagnosis.effects.words import quantity
 from tendonfmu.diagnosis.result import Cause, CausePlace, Diagnosis, Parameters
 from tendonfmu.files import counted
+from tendonfmu.model import steps_of
 
 
 @dataclass(frozen=True)
@@ -60,16 +62,15 @@ def at_place(title: str, where: Where, names: Names) -> str:
 
 # --- sizes ------------------------------------------------------------------------------------------------------------
 
-Thresholds = tuple[float, float]  # velocities of motion, of tendons and of joints
 _SHOWN = 3  # numbers that are listed for an effect without words of its own
 
 
-def size_of(effect: str, places: Sequence[CausePlace], thresholds: Thresholds) -> str:
+def size_of(effect: str, places: Sequence[CausePlace], data: Data) -> str:
     """Return a size such as "a play of 0.32 mm"; for several places the largest one and their number."""
     sized = [place for place in places if place.parameters]
     if not sized:
         return ""
-    sizes = list(dict.fromkeys(size_at(effect, place.parameters, thresholds) for place in sized))
+    sizes = list(dict.fromkeys(size_at(effect, place.parameters, data) for place in sized))
     if len(sized) == 1:
         return sizes[0]
     if len(sizes) == 1:
@@ -78,30 +79,33 @@ def size_of(effect: str, places: Sequence[CausePlace], thresholds: Thresholds) -
     if len(units) > 1:  # for example everywhere and at a joint
         return f"{sizes[0]}; different at {counted(len(sized) - 1, 'place')}"
     largest = max(sized, key=lambda place: abs(_first(place)[0]))
-    return f"{size_at(effect, largest.parameters, thresholds)} at the largest of {len(sized)} places"
+    return f"{size_at(effect, largest.parameters, data)} at the largest of {len(sized)} places"
 
 
-def size_at(effect: str, parameters: Parameters, thresholds: Thresholds) -> str:
-    """Return the size of an effect at one place in plain words."""
-    if effect == "presliding" and (sized := _travel(parameters, thresholds)):
-        return sized
+def size_at(effect: str, parameters: Parameters, data: Data) -> str:
+    """Return the size of an effect at one place of a description in plain words."""
     numbers: dict[str, list[tuple[float, str]]] = {}
     for path, number in parameters.items():
         numbers.setdefault(path.rsplit(".", 1)[-1], []).append(number)
+    if effect == "presliding":
+        numbers = _of_memory(parameters, data)
     try:
         return BY_NAME[effect].size(numbers)
     except (KeyError, ValueError):  # it is given by other numbers, for example by a law instead of a row
         return _listed(parameters)
 
 
-def _travel(parameters: Parameters, thresholds: Thresholds) -> str:
-    """Return the travel of presliding at all places, whose number is a time: time × threshold of motion."""
-    times = [value for path, (value, unit) in parameters.items() if path.endswith(".displacement") and unit == "s"]
-    if not times:
-        return ""
-    time = max(times)
-    tendon, joint = (quantity(time * threshold, unit) for threshold, unit in zip(thresholds, ("m", "rad"), strict=True))
-    return f"over {tendon} at tendons, {joint} at joints"
+def _of_memory(parameters: Parameters, data: Data) -> dict[str, list[tuple[float, str]]]:
+    """Return the numbers of a memory by name: those of cords apart, times as travels at the threshold of motion."""
+    numbers: dict[str, list[tuple[float, str]]] = {}
+    for path, (value, unit) in parameters.items():
+        _, row, name = steps_of(path)
+        named = numbers.setdefault("cords" if data["extensions"][row]["effect"] == "cord_stretch" else str(name), [])
+        if name == "displacement" and unit == "s":
+            named += [(value * threshold, at) for threshold, at in zip(thresholds(data), ("m", "rad"), strict=True)]
+        else:
+            named.append((value, unit))
+    return numbers
 
 
 def _first(place: CausePlace) -> tuple[float, str]:

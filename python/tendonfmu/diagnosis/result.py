@@ -299,6 +299,11 @@ class Diagnosis:
     load: SteadyLoad | None = None  # torque that is present now and was not in the reference
 
     @property
+    def undecided(self) -> tuple[Cause, ...]:
+        """The uncertain causes that would matter if their gain is what unseen data show; all where none could."""
+        return tuple(each for each in self.uncertain if each.gain.value >= self.least_gain or each.gain == NO_GAIN)
+
+    @property
     def torque_causes(self) -> tuple[Cause, ...]:
         """The causes that change the modelled torque, in the order of `steps`."""
         return tuple(cause for cause in self.causes if cause.has_step)

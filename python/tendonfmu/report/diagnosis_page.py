@@ -14,7 +14,6 @@ from tendonfmu.diagnosis import (
     at_place,
     reported_causes,
     size_at,
-    thresholds,
     title_of,
 )
 from tendonfmu.files import counted
@@ -58,7 +57,7 @@ def diagnosis_page(diagnosis: Diagnosis) -> str:
         too_small=_too_small(diagnosis, names),
         uncertain=[
             (capital(cause.title), names.places(cause), percent_interval(cause.gain), capital(cause.experiment))
-            for cause in diagnosis.uncertain
+            for cause in diagnosis.undecided
         ],
         errors=_errors(diagnosis, names, factor),
         events=_events(diagnosis, names, factor),
@@ -109,10 +108,9 @@ def _tiles(diagnosis: Diagnosis) -> Iterator[Tile]:
     else:
         yield Tile(before, unit, "error on test data, all joints")
     if left := texts.left_of(diagnosis):
-        noise = ":" if left.memory else " is noise:"
-        yield Tile(left.text(left.noise), unit, f"of what remains{noise} no recorded signal predicts it")
-        if left.predictable > 0.0:
-            yield Tile(left.text(left.predictable), unit, f"of what remains {words.no_name}")
+        known = f": what remains, without the part that {words.no_name}" if left.predictable > 0.0 else ""
+        noise = "" if left.memory else "noise, "
+        yield Tile(left.text(left.noise), unit, f"{noise}that no recorded signal predicts{known}")
 
 
 def _untold(diagnosis: Diagnosis, names: Names) -> Iterator[str]:
@@ -143,8 +141,7 @@ def _card(diagnosis: Diagnosis, cause: Cause, names: Names) -> dict[str, Any]:
     """Return what a page shows of one cause."""
     certainty = f"p = {probability(cause.p_value)}".replace("= <", "<")
     # the tiles and the waterfall show r itself
-    numbers = thresholds(diagnosis.extended_data)
-    sizes = [size_at(cause.where.effect, place.parameters, numbers) for place in cause.places]
+    sizes = [size_at(cause.where.effect, place.parameters, diagnosis.extended_data) for place in cause.places]
     return {
         "title": capital(cause.title),
         "full": at_place(capital(cause.title), cause.where, names),

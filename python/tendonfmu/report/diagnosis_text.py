@@ -133,7 +133,7 @@ def headline(diagnosis: Diagnosis) -> str:
             text += f" But {left.text(left.whole)} of {before} {unit} remain{memory}: no recorded signal predicts them."
     for cause in reported_causes(diagnosis):
         if cause.where.effect == CONTACT and cause.changed is None:
-            text += f" In some stretches {cause.title}: they were left out ({cause.size})."
+            text += f" In some stretches it seems that {cause.title}: they were left out ({cause.size})."
         elif cause.where.effect == CONTACT:
             contact = f"{at_place(cause.title, cause.where, names_of(diagnosis))}, {cause.size}."
             text = f"{text} And {contact}" if count else capital(contact)
@@ -178,11 +178,11 @@ def left_sentence(diagnosis: Diagnosis) -> str:
         )
     if left.predictable <= 0.0:
         return f"{left.text(left.whole)} {unit} remain. No recorded signal predicts any of it, {noise}."
-    little = "" if diagnosis.unexplained.unknown or diagnosis.kind == "change" else "; it is too small to matter"
+    is_little = not diagnosis.unexplained.unknown and diagnosis.kind != "change"
+    little = ": too little to matter, or no more than another friction law would gain" if is_little else ""
     return (
-        f"{left.text(left.whole)} {unit} remain. {left.text(left.predictable)} {unit} of it "
-        f"{words_of(diagnosis.kind).no_name}{little}. No recorded signal predicts the other {left.text(left.noise)} "
-        f"{unit}, {noise}."
+        f"{left.text(left.whole)} {unit} remain. Without the part that {words_of(diagnosis.kind).no_name} it would be "
+        f"{left.text(left.noise)} {unit}{little}. No recorded signal predicts the rest, {noise}."
     )
 
 
@@ -386,7 +386,7 @@ def lines(diagnosis: Diagnosis) -> Iterator[str]:
     if diagnosis.too_small:
         small = dict.fromkeys(at_place(each.title, each.where, names) for each in diagnosis.too_small)
         yield f"too small to matter: {'; '.join(small)}"
-    for cause in diagnosis.uncertain:
+    for cause in diagnosis.undecided:
         less = f"gain {percent_interval(cause.gain)}"
         yield f"uncertain: {at_place(cause.title, cause.where, names)}, {less}; to decide: {cause.experiment}"
     yield from hidden_sentences(diagnosis, names)

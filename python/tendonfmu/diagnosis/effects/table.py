@@ -194,10 +194,10 @@ MECHANISMS: tuple[Mechanism, ...] = (
     ),
     Mechanism(
         name="cord_stretch",
-        title="cords stretch between the joints",
-        explanation="Between its pulleys a cord stretches with the force that friction makes it carry, so pulleys "
-        "turn while joints stand. Look at how far a pulley near the motor turns when a joint is held and the motor "
-        "pulls.",
+        title="cords stretch along their way",
+        explanation="Between the places where it rubs a cord stretches with the force that friction makes it carry, "
+        "so pulleys turn while joints stand. Look at how far a pulley near the motor turns when a joint is held and "
+        "the motor pulls.",
         coordinate="force",
         possible_places=nowhere,
         make=terms.row(),

@@ -14,7 +14,8 @@ Words = Callable[[Sizes], str]
 NBSP = "\u00a0"
 _PREFIXED = ("m", "N.m", "N", "s", "rad", "m/s", "rad/s", "m/rad", "N.m/rad", "N.m.s/rad")
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_LEAST_TRAVEL = {"m": 1e-6, "rad": 1e-4}  # that a hand's sensors show
+# travels that a hand's sensors show, and stiffnesses that hold its friction over such a travel
+_SHOWN = {"m": (1e-6, math.inf), "rad": (1e-4, math.inf), "N/m": (0.0, 1e6), "N.m/rad": (0.0, 50.0)}
 _STEPS = ((0.1, 1.0, ""), (1e-4, 1e3, "m"), (0.0, 1e6, "µ"))  # least magnitude, factor, prefix
 
 
@@ -34,18 +35,27 @@ def quantity(value: float, unit: str, *, sign: bool = False) -> str:
 
 
 def presliding(numbers: Sizes) -> str:
-    """Return over what friction builds up, or how stiff it is before it slips."""
+    """Return over what friction builds up, or how stiff it is before it slips, and what else it does."""
     name, text = ("displacement", "over {}") if "displacement" in numbers else ("stiffness", "a stiffness of {}")
     of_unit: dict[str, list[float]] = {}
     for value, unit in numbers[name]:
         of_unit.setdefault(unit, []).append(value)
-    ranges = [dict.fromkeys(_travel(end, unit) for end in (min(own), max(own))) for unit, own in of_unit.items()]
-    return text.format(" and ".join(" to ".join(ends) for ends in ranges))
+    ranges = {unit: dict.fromkeys(_shown(end, unit) for end in (min(own), max(own))) for unit, own in of_unit.items()}
+    sized = (f"{' to '.join(ends)} at {'joint' if 'rad' in unit else 'tendon'}s" for unit, ends in ranges.items())
+    return text.format(", ".join(sized)) + memory_parts(numbers)
 
 
-def _travel(value: float, unit: str) -> str:
-    least = _LEAST_TRAVEL.get(unit, 0.0)
-    return f"less than {quantity(least, unit)}" if value < least else quantity(value, unit)
+def memory_parts(numbers: Sizes) -> str:
+    """Return what a memory has beside presliding."""
+    text = ", fading within {} at rest" if "relaxation_time" in numbers else ""
+    text = text.format(quantity(*numbers["relaxation_time"][0])) if text else ""
+    return text + (f", along cords of {quantity(*numbers['cords'][0])}" if "cords" in numbers else "")
+
+
+def _shown(value: float, unit: str) -> str:
+    least, most = _SHOWN[unit]
+    below = f"less than {quantity(least, unit)}" if value < least else quantity(value, unit)
+    return f"more than {quantity(most, unit)}" if value > most else below
 
 
 def _one(numbers: Sizes, name: str) -> tuple[float, str]:
