@@ -136,6 +136,9 @@ def test_angles_stay_as_the_core_sees_them_where_forces_are_late(delay: float, s
 
 # --- where it starts --------------------------------------------------------------------------------------------------
 
+HARDENING, LATE = 4e5, 4  # N/m², samples
+BENT = [{"effect": "tendon_nonlinearity", "tendon": i, "hardening": HARDENING} for i in range(1, 5)]
+
 
 @pytest.mark.parametrize("samples", [4, -3])
 def test_positions_and_forces_tell_their_delay(samples: int) -> None:
@@ -143,6 +146,20 @@ def test_positions_and_forces_tell_their_delay(samples: int) -> None:
     shown = Positions(described(finger()), [made])
     assert shown.delay == pytest.approx(samples / RATE, abs=max(4.0 * shown.error, 1e-5))
     assert 0.0 < shown.error < 1e-4
+
+
+@pytest.mark.parametrize(("kinematics", "delay"), [(1, 0.0), (2, LATE / RATE)])
+def test_encoders_of_another_clock_tell_their_delay(kinematics: int, delay: float, sound: FitRecording) -> None:
+    """It matters where the angles are theirs: forces and positions of the tendons come later than these."""
+    groups = sound.recording.groups
+    late = {name: np.roll(groups[name], LATE, axis=0) for name in ("tendon_force", "tendon_position")}
+    made = replace(sound.with_groups(**late), kinematics=kinematics)
+    shown = Positions(described(finger()), [made])
+    if kinematics == 1:
+        assert shown.delay is None or abs(shown.delay) < 5e-4
+    else:
+        inside = made.train & (made.time > made.time[2 * LATE]) & (made.time < made.time[-2 * LATE])
+        assert shown.delay == pytest.approx(delay, abs=5e-4) and shown.gain([(made, inside)], delay, 0).low > 0.5
 
 
 def test_no_more_tendons_than_joints_tell_no_delay(sound: FitRecording) -> None:
@@ -153,10 +170,6 @@ def test_no_more_tendons_than_joints_tell_no_delay(sound: FitRecording) -> None:
     few = replace(sound, recording=replace(sound.recording, groups={k: v for k, v in groups.items() if "tendon" in k}))
     assert Positions(described(data), [few]).delay is None
     assert Positions(described(data), [encoders]).delay == pytest.approx(0.0, abs=5e-4), "encoders tell it"
-
-
-HARDENING, LATE = 4e5, 4  # N/m², samples
-BENT = [{"effect": "tendon_nonlinearity", "tendon": i, "hardening": HARDENING} for i in range(1, 5)]
 
 
 @pytest.fixture(scope="module")

@@ -21,6 +21,7 @@ LONGEST = EFFECT_NUMBERS["time_delay"]["delay"].most  # s in either direction
 FINE = 0.001  # s
 LARGE = 0.005  # s: smaller delays compete with other causes, by their derivative
 CLEAR_GAIN = 0.1  # of the rms that a starting delay must remove: any other missing effect looks a little like a delay
+TENDONS = 1  # source of the angles: positions of the tendons
 CLEAR = 0.25  # error of the best delay, at most, over the median error of all delays
 
 
@@ -51,7 +52,8 @@ class Positions:
     """What positions tell of a delay, whatever friction is.
 
     With joint encoders, or more tendons than joints, the joint-side positions x0 − f0/k agree with the angles, or with
-    each other, only if positions and forces are of the same time.
+    each other, only if positions and forces are of the same time. Where the angles are those of encoders, the tendons'
+    positions may be as late as their forces: two loggers, two clocks.
     """
 
     def __init__(self, finger: Finger, recordings: Sequence[FitRecording]) -> None:
@@ -62,8 +64,9 @@ class Positions:
         self._apart = np.eye(len(self._arms)) - (0.0 if self._measured else self._arms @ np.linalg.pinv(self._arms))
         tells = all("tendon_position" in own for own in groups) and np.linalg.matrix_rank(self._apart) > 0
         self._recordings = recordings if tells else ()
+        self._behind = False  # whether the tendons' positions are as late as their forces
         # s, with its standard error; None: they do not show whether there is one
-        self.delay, self.error = self._found(recordings) if tells else (None, np.nan)
+        self.delay, self.error = self._found() if tells else (None, np.nan)
 
     def contradict(self, before: Data, after: Data) -> bool:
         """Return whether they agree worse with the springs and plays of one description than with those before."""
@@ -79,9 +82,14 @@ class Positions:
         before, after = np.concatenate(pairs).T
         return gain_interval(before, after, seed, variance_between(pairs) / len(pairs))
 
-    def _found(self, recordings: Sequence[FitRecording]) -> tuple[float | None, float]:
+    def _found(self) -> tuple[float | None, float]:
         delays = np.arange(-LONGEST, LONGEST + FINE / 2, FINE)
-        errors = np.concatenate([self._squares(one, np.ones(len(one.time), dtype=bool), delays) for one in recordings])
+        ways = []
+        for behind in (False, True) if self._measured and self._recordings[0].kinematics != TENDONS else (False,):
+            self._behind = behind
+            every = [self._squares(one, np.ones(len(one.time), dtype=bool), delays) for one in self._recordings]
+            ways.append((np.concatenate(every), behind))
+        errors, self._behind = min(ways, key=lambda way: float(way[0].sum(axis=0).min()))
         whole = errors.sum(axis=0)
         best = int(np.argmin(whole))
         if not 0 < best < len(delays) - 1 or whole[best] > CLEAR * float(np.median(whole)):
@@ -96,19 +104,21 @@ class Positions:
     ) -> Numbers:
         """Return by block of the chosen samples the sum of squares that the equation leaves (m²) [K, delays]."""
         groups, index = recording.recording.groups, blocks_of(recording.time, chosen)
-        position = groups["tendon_position"] - (groups["joint_position"] @ self._arms.T if self._measured else 0.0)
         linear = with_linear_springs(springs or self._finger, recording.recording).groups["tendon_position"]
-        stretch = groups["tendon_force"] / self._stiffness + (groups["tendon_position"] - linear)
+        early = -groups["joint_position"] @ self._arms.T if self._measured else np.zeros(linear.shape)
+        position, stretch = groups["tendon_position"], groups["tendon_force"] / self._stiffness
+        late = linear - position - stretch
+        early, late = (early, late + position) if self._behind else (early + position, late)
         sums, squares = [], np.zeros(len(recording.time))
         for delay in delays.tolist():
             for part in recording.parts:
-                left = self._left(recording.time[part], position[part], stretch[part], delay)
+                left = self._left(recording.time[part], early[part], late[part], delay)
                 squares[part] = (left**2).sum(axis=1)
             sums.append(index.sums(squares))
         return np.column_stack(sums)
 
-    def _left(self, time: Numbers, position: Numbers, stretch: Numbers, delay: float) -> Numbers:
-        """Return what the equation leaves of a part with a delay, less its mean (m)."""
-        late = [np.interp(time - delay, time, column) for column in position.T]
-        left = (np.stack(late, axis=1) - stretch) @ self._apart
+    def _left(self, time: Numbers, early: Numbers, late: Numbers, delay: float) -> Numbers:
+        """Return what the equation leaves of a part if some of it comes a delay earlier, less its mean (m)."""
+        before = np.stack([np.interp(time - delay, time, column) for column in early.T], axis=1)
+        left = (before + late) @ self._apart
         return np.asarray(left - left.mean(axis=0))
