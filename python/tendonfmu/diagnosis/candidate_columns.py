@@ -109,7 +109,8 @@ def _proposed(
 # that the description has may have changed, too.
 
 
-LARGEST_SCALING = 0.2  # of the tendon's largest arm, or of its force, anywhere in the joint's range
+LARGEST_SCALING = 0.2  # of the tendon's largest arm, or of its force
+LARGEST_VARIATION = 0.5  # of the largest arm, by which an arm changes in the joint's range: cords bow and leave pulleys
 LARGEST_DRIFT = 5.0  # of the friction: where it is next to 0, any drift is a multiple of it
 LEAST_OF_FAST = 0.3  # least gain of a pulley that turns faster than its joint: any function of the angle resembles it
 LARGEST = 1e3  # times an ordinary size: a column of next to nothing would ask for any
@@ -195,9 +196,10 @@ def _single(proposal: Proposal, count: int, arms: Numbers, reach: Numbers, torqu
     expected = np.array(variant.expected)
     low, high = _signed(variant, expected)
     if name in SCALING and place.tendon is not None:
-        largest = LARGEST_SCALING * (1.0 if name == "force_gain" else float(np.abs(arms[place.tendon - 1]).max()))
+        arm = float(np.abs(arms[place.tendon - 1]).max())
+        largest = LARGEST_SCALING * (1.0 if name == "force_gain" else arm)
         if name == "moment_arm_variation" and place.joint is not None:
-            largest /= max(float(reach[place.joint - 1]), 1e-9)
+            largest = LARGEST_VARIATION * arm / max(float(reach[place.joint - 1]), 1e-9)
         low, high = np.maximum(low, -largest), np.minimum(high, largest)
     if name == "gravity" and place.joint is not None:  # a larger one only imitates other torque beside the cover's
         largest = float(torque[place.joint - 1] / np.sin(np.clip(reach[place.joint - 1], 1e-9, np.pi / 2)))
