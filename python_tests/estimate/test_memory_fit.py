@@ -18,9 +18,9 @@ from tendonfmu import diagnose
 from tendonfmu.errors import InputError
 from tendonfmu.estimate.fitting import FrictionFit
 from tendonfmu.estimate.learning import posterior_factor
-from tendonfmu.estimate.memory_choice import NEAR, choose_memory
+from tendonfmu.estimate.memory_choice import NEAR, _Search, choose_memory
 from tendonfmu.estimate.structure import Choice
-from tendonfmu.model import finger_from_data, get_number, moment_arms
+from tendonfmu.model import finger_from_data, get_number, moment_arms, set_number
 from tendonfmu.recordings import FitRecording, Held, Recording, best_angles, prepare
 
 pytestmark = pytest.mark.filterwarnings(
@@ -168,6 +168,19 @@ def test_the_form_is_chosen_by_what_is_left_out(truth: Rows, name: str) -> None:
     whole = {form: errors[form] for form in ("relative", "absolute")}
     grown = {form.partition(",")[0] for form in errors if "," in form}
     assert grown == {form for form in whole if whole[form] < NEAR * min(whole.values())}
+
+
+def test_a_fit_starts_inside_where_a_number_is_rounded_out_of_its_box() -> None:
+    given = finger_from_data(finger(), Path("small.json"))
+    search = _Search(given, [prepared()], Choice(), 1)
+    _, estimator = search._structure(())
+    k, item = next((k, each) for k, each in enumerate(estimator.unknowns) if each.path.endswith("static"))
+    data = copy.deepcopy(given.data)
+    set_number(data, item.path, 0.997 * item.lower)
+    set_number(data, item.path.replace("static", "coulomb"), 0.5 * item.lower)
+    begin = search._numbers_of(estimator, data)
+    assert begin[k] == item.lower > 0.0
+    estimator.values(begin)  # it accepts them
 
 
 # --- the best angles --------------------------------------------------------------------------------------------------
