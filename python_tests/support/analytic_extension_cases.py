@@ -135,6 +135,7 @@ def corrected_measurements(run: Run) -> None:
         {"effect": "force_offset", "tendon": 2, "correction": -0.5},
         {"effect": "moment_arm", "joint": 1, "tendon": 2, "correction": 2e-3},
         {"effect": "moment_arm_variation", "joint": 2, "tendon": 1, "slope": 4e-3},
+        {"effect": "moment_arm_variation", "joint": 1, "tendon": 1, "slope": 2e-3, "correction": -1e-3},
         {"effect": "pulley_eccentricity", "joint": 2, "tendon": 2, "sine": 1e-3, "cosine": 3e-3},
     ]
     # q = R⁺ (x0 − f0/k) with x0 = R (0.3, π/6) + f0/k
@@ -145,7 +146,7 @@ def corrected_measurements(run: Run) -> None:
     description = two_joints(extensions)
     out = run(description, rec, 1)
     arm = 1e-3 * 0.5 + 3e-3 * math.sqrt(0.75)
-    first = -0.1 * 0.01 * 20.0 + 0.5 * 0.03 + 2e-3 * 8.0
+    first = -0.1 * 0.01 * 20.0 + 0.5 * 0.03 + 2e-3 * 8.0 - (2e-3 * 0.3 - 1e-3) * 20.0
     second = -0.1 * 0.02 * 20.0 - 0.5 * 0.01 - 4e-3 * (math.pi / 6) * 20.0 + arm * 8.0
     close(torque(out), [[first, second]] * 2)
     close(out["joint_torque"], [[0.2 - 0.24, 0.4 + 0.08]] * 2)

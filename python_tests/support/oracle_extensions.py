@@ -28,6 +28,7 @@ OPTIONAL_NUMBERS = {
     "cover_hardening": ("quadratic",),
     "gravity": ("sine", "cosine"),
     "inertia_variation": ("sine", "cosine"),
+    "moment_arm_variation": ("correction",),
     "pulley_eccentricity": ("sine", "cosine"),
 }
 MECHANISM = {
@@ -144,7 +145,7 @@ def torque_of(row: Row, numbers: Mapping[str, Any], at: Moment, R: Array, cosine
     elif row.effect == "moment_arm":
         T[j] = -numbers["correction"] * at.f0[i]
     elif row.effect == "moment_arm_variation":
-        T[j] = -numbers["slope"] * at.q[j] * at.f0[i]
+        T[j] = -(numbers["slope"] * at.q[j] + numbers["correction"]) * at.f0[i]
     elif row.effect == "pulley_eccentricity":
         turned = numbers["turns"] * at.q[j]
         arm = numbers["sine"] * np.sin(turned) + numbers["cosine"] * np.cos(turned)

@@ -104,7 +104,9 @@ MAKE: dict[str, Make] = {
     "force_gain": lambda rng, n, m, j, i: {"tendon": i, "correction": either(rng, 0.2)},
     "force_offset": lambda rng, n, m, j, i: {"tendon": i, "correction": either(rng, 1.0)},
     "moment_arm": lambda rng, n, m, j, i: {"joint": j, "tendon": i, "correction": either(rng, 2e-3)},
-    "moment_arm_variation": lambda rng, n, m, j, i: {"joint": j, "tendon": i, "slope": either(rng, 2e-3)},
+    "moment_arm_variation": lambda rng, n, m, j, i: (
+        {"joint": j, "tendon": i, "slope": either(rng, 2e-3)} | ({"correction": 1e-3 * i - 2e-3} if i % 2 else {})
+    ),
     "pulley_eccentricity": lambda rng, n, m, j, i: (
         {"joint": j, "tendon": i, "sine": either(rng, 1e-3)}
         | ({"cosine": either(rng, 1e-3)} if i % 2 else {})

@@ -151,7 +151,7 @@ std::vector<Effect> all_torques() {
           {"force_gain", 0, 2, {0.07}},
           {"force_offset", 0, 1, {-0.5}},
           {"moment_arm", 3, 1, {6e-4}},
-          {"moment_arm_variation", 2, 2, {-4e-4}},
+          {"moment_arm_variation", 2, 2, {-4e-4, 3e-4}},
           {"pulley_eccentricity", 3, 1, {5e-4, 3e-4, 1.0}},
           {"pulley_eccentricity", 2, 2, {5e-4, 3e-4, 7.5}}};
 }

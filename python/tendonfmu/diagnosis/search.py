@@ -9,7 +9,8 @@ certain. The rules by which a round chooses a cause, in their order:
 3. All corrections of sensors together come before it if they are materially and certainly better (`is_better`).
 4. Effects that columns cannot distinguish from it are fitted, too, and the best fit is taken: columns of a wrong model
    mislead. A correction of the torque may replace only another one: it resembles most effects (`_to_fit`).
-5. Of fits that are alike, torque that depends on the angles comes first, since friction takes it up.
+5. Of fits that are alike, torque that depends on the angles comes first, since friction takes it up; else the one with
+   fewest numbers.
 6. The effect is fitted at the nearly best places, too, and the best is taken.
 7. A single sensor may be several, if their usual errors explain nearly as much (`beside_calibration`).
 """
@@ -273,7 +274,8 @@ class ExtensionSearch(CauseSearch):
         trials = self._certain_trials([self._named(best, selection)], rivals)
         chosen = _best_of(trials)
         same = [trial for trial in trials if trial.model is not None and is_alike(trial.error, chosen.error)]
-        chosen = next((trial for trial in same if trial.cause.effect in POSITION), chosen)
+        simplest = min(same, key=lambda trial: (len(trial.cause.low), float(trial.error.sum())), default=chosen)
+        chosen = next((trial for trial in same if trial.cause.effect in POSITION), simplest)
         fitted = {trial.cause.effect for trial in trials}
         alike = [trial.cause for trial in same if trial is not chosen]
         alike += [rival for rival in best.alike if rival.effect not in fitted]

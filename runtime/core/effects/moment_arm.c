@@ -43,9 +43,11 @@ static arm_correction constant(const double* parameters, double angle) {
 }
 BY_CORRECTION(moment_arm, constant);
 
+enum { SLOPE, CORRECTION };
+
 /* as where a tendon lifts off its guide */
 static arm_correction linear(const double* parameters, double angle) {
-  return (arm_correction){.value = parameters[0] * angle, .by_angle = parameters[0]};
+  return (arm_correction){.value = parameters[SLOPE] * angle + parameters[CORRECTION], .by_angle = parameters[SLOPE]};
 }
 BY_CORRECTION(moment_arm_variation, linear);
 

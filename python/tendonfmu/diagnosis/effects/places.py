@@ -273,6 +273,11 @@ def pulley(data: Data, place: Place, span: Span) -> Grid:
     return [{"turns": float(turns)} for turns in (1.0, *fast)]
 
 
+def middle(data: Data, place: Place, span: Span) -> Grid:
+    """Return the middle of the joint's range, where an arm is as described."""
+    return [{"middle": float(span.angle[(place.joint or 1) - 1].mean())}]
+
+
 def hardening(data: Data, place: Place, span: Span) -> Grid:
     tendon = (place.tendon or 1) - 1
     largest = float(abs(span.force[tendon]).max())

@@ -277,8 +277,9 @@ MECHANISMS: tuple[Mechanism, ...] = (
         "pulley. Watch the tendon's line at both ends of the joint's range.",
         coordinate="angle",
         possible_places=places.passes,
-        make=terms.row(slope=0),
+        make=terms.variation,
         size=words.of("the arm changes by {}", "slope"),
+        find_shapes=places.middle,
     ),
     Mechanism(
         name="pulley_eccentricity",

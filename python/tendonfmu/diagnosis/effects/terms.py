@@ -73,6 +73,14 @@ def hardening(name: str, data: Data, place: Place, shape: Shape) -> Variant:
     return replace(variant, columns=tuple(replace(variant.columns[0], numbers=numbers) for numbers in ends))
 
 
+def variation(name: str, data: Data, place: Place, shape: Shape) -> Variant:
+    """Return an arm that changes about the middle of the range: there it was measured."""
+    variant = row(slope=0, correction=0)(name, data, place, {})
+    (slope,), (correction,) = (tuple(column.numbers) for column in variant.columns)
+    about = replace(variant.columns[0], numbers={slope: 1.0, correction: -shape.get("middle", 0.0)})
+    return replace(variant, shape=shape, columns=(about,))
+
+
 def secant(number: str, *, most: float = math.inf) -> Make:
     """Return a row without a useful derivative at zero: its column is a finite difference."""
 
