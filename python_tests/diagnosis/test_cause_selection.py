@@ -15,6 +15,7 @@ from tendonfmu.diagnosis.candidate_columns import (
     HERE,
     LARGEST,
     LARGEST_SCALING,
+    LARGEST_VARIATION,
     LARGEST_SECANT,
     SOMEWHERE,
     Candidate,
@@ -130,7 +131,7 @@ def test_corrections_of_the_torque_have_a_largest_size(columns: Numbers) -> None
         LARGEST_SCALING,
     )
     assert found["moment_arm"].high == pytest.approx([LARGEST_SCALING * 0.008])
-    assert found["moment_arm_variation"].high == pytest.approx([LARGEST_SCALING * 0.008 / 0.5])
+    assert found["moment_arm_variation"].high == pytest.approx([LARGEST_VARIATION * 0.008 / 0.5])
     assert found["gravity"].high == pytest.approx([0.1 / np.sin(0.5)]), "no more than the torque that was measured"
     assert found["load_friction"].high == [LARGEST]
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 
 from fit_cases import plain
 from fit_data import make_recording, wavy_forces, wavy_motion
@@ -160,6 +161,28 @@ def test_encoders_of_another_clock_tell_their_delay(kinematics: int, delay: floa
     else:
         inside = made.train & (made.time > made.time[2 * LATE]) & (made.time < made.time[-2 * LATE])
         assert shown.delay == pytest.approx(delay, abs=5e-4) and shown.gain([(made, inside)], delay, 0).low > 0.5
+
+
+@pytest.mark.parametrize(
+    "row",
+    [
+        {"effect": "moment_arm_variation", "slope": 2e-3, "correction": -4e-4},
+        {"effect": "pulley_eccentricity", "sine": 1e-3, "cosine": 5e-4, "turns": 2.0},
+    ],
+    ids=str,
+)
+def test_encoders_contradict_an_arm_that_changes_at_another_tendon(row: dict[str, Any], sound: FitRecording) -> None:
+    arms, given = np.linspace(-0.3, 1.2, 2001), sound.recording.groups
+    angle, change = given["joint_position"][:, 1], row.get("slope", 0.0) * arms + row.get("correction", 0.0)
+    turned = row.get("turns", 1.0) * arms
+    change = change + row.get("sine", 0.0) * np.sin(turned) + row.get("cosine", 0.0) * np.cos(turned)
+    travel = cumulative_trapezoid(change, arms, initial=0.0)
+    moved = given["tendon_position"].copy()
+    moved[:, 2] += np.interp(angle, arms, travel)
+    shown = Positions(described(finger()), [replace(sound.with_groups(tendon_position=moved), kinematics=2)])
+    here, there = (finger() | {"extensions": [row | {"joint": 2, "tendon": i}]} for i in (3, 4))
+    assert shown.contradict(finger(), there) and shown.contradict(here, finger())
+    assert not shown.contradict(finger(), here)
 
 
 def test_no_more_tendons_than_joints_tell_no_delay(sound: FitRecording) -> None:

@@ -12,8 +12,8 @@ from tendonfmu.diagnosis.extension_fit import FittedModel
 from tendonfmu.diagnosis.samples import Samples, shifted
 from tendonfmu.diagnosis.selection import LeastSizes
 from tendonfmu.diagnosis.view import look
-from tendonfmu.model import EFFECT_NUMBERS, Finger, moment_arms
-from tendonfmu.recordings import FitRecording, with_linear_springs
+from tendonfmu.model import EFFECT_NUMBERS, Finger, extension_rows, moment_arms
+from tendonfmu.recordings import BENDING, FitRecording, with_linear_springs
 from tendonfmu.statistics import Interval, blocks_of, gain_interval, variance_between
 
 DELAY = by_name("time_delay")
@@ -21,6 +21,8 @@ LONGEST = EFFECT_NUMBERS["time_delay"]["delay"].most  # s in either direction
 FINE = 0.001  # s
 LARGE = 0.005  # s: smaller delays compete with other causes, by their derivative
 CLEAR_GAIN = 0.1  # of the rms that a starting delay must remove: any other missing effect looks a little like a delay
+CHANGING = ("moment_arm_variation", "pulley_eccentricity")  # arms
+SHOWN = (*BENDING, *CHANGING)  # what positions may contradict
 TENDONS = 1  # source of the angles: positions of the tendons
 CLEAR = 0.25  # error of the best delay, at most, over the median error of all delays
 
@@ -48,6 +50,20 @@ def delay_of_torque(model: FittedModel, samples: Samples, least: LeastSizes) -> 
     return late_forces(float(delays[best])) if clear else ()
 
 
+def _further(finger: Finger, angle: Numbers) -> Numbers:
+    """Return what arms that change with the angle add to the travels of the tendons at angles [N, n], m [N, m]."""
+    travel = np.zeros((len(angle), finger.tendons))
+    for row in extension_rows(finger.data):
+        if row["effect"] in CHANGING:
+            at, turns = angle[:, row["joint"] - 1], float(row.get("turns") or 1.0)
+            slope, fixed, sine, cosine = (
+                float(row.get(key) or 0.0) for key in ("slope", "correction", "sine", "cosine")
+            )
+            wave = cosine * np.sin(turns * at) - sine * np.cos(turns * at)
+            travel[:, row["tendon"] - 1] += slope * at**2 / 2.0 + fixed * at + wave / turns
+    return travel
+
+
 class Positions:
     """What positions tell of a delay, whatever friction is.
 
@@ -69,7 +85,7 @@ class Positions:
         self.delay, self.error = self._found() if tells else (None, np.nan)
 
     def contradict(self, before: Data, after: Data) -> bool:
-        """Return whether they agree worse with the springs and plays of one description than with those before."""
+        """Return whether they agree worse with springs, plays and changing arms of one description than before."""
         errors = []
         for data in (before, after):
             finger, late = self._finger.with_data(data), np.array([self.delay or 0.0])
@@ -100,12 +116,16 @@ class Positions:
         return float(found), float(np.std(others) * np.sqrt(len(others) - 1))
 
     def _squares(
-        self, recording: FitRecording, chosen: Flags, delays: Numbers, springs: Finger | None = None
+        self, recording: FitRecording, chosen: Flags, delays: Numbers, finger: Finger | None = None
     ) -> Numbers:
         """Return by block of the chosen samples the sum of squares that the equation leaves (m²) [K, delays]."""
         groups, index = recording.recording.groups, blocks_of(recording.time, chosen)
-        linear = with_linear_springs(springs or self._finger, recording.recording).groups["tendon_position"]
-        early = -groups["joint_position"] @ self._arms.T if self._measured else np.zeros(linear.shape)
+        linear = with_linear_springs(finger or self._finger, recording.recording).groups["tendon_position"]
+        early = np.zeros(linear.shape)
+        if self._measured:
+            early -= groups["joint_position"] @ self._arms.T + _further(
+                finger or self._finger, groups["joint_position"]
+            )
         position, stretch = groups["tendon_position"], groups["tendon_force"] / self._stiffness
         late = linear - position - stretch
         early, late = (early, late + position) if self._behind else (early + position, late)

@@ -28,7 +28,7 @@ from tendonfmu.arrays import Numbers
 from tendonfmu.diagnosis.base import POSITION, Base, forgetful, refitted, remembering
 from tendonfmu.diagnosis.candidate_columns import EVERYWHERE, Candidate, Proposal
 from tendonfmu.diagnosis.contact_scan import events_of
-from tendonfmu.diagnosis.delay import DELAY
+from tendonfmu.diagnosis.delay import DELAY, SHOWN
 from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION, OF_LAW, Place, Term, Where
 from tendonfmu.diagnosis.extension_fit import (
     REMEMBERING,
@@ -53,7 +53,6 @@ from tendonfmu.diagnosis.selection import (
 from tendonfmu.diagnosis.view import View
 from tendonfmu.estimate import SCALING
 from tendonfmu.model import Finger, moment_arms
-from tendonfmu.recordings import BENDING
 from tendonfmu.statistics import Interval
 from tendonfmu.tasks import Phases, Step
 
@@ -306,7 +305,7 @@ class ExtensionSearch(CauseSearch):
         model = fit_extended(base.nominal, terms, predicted, base.settings, self.model, rough=True)
         model = refitted(model, base.samples, base.settings, rough=True)
         shown = base.least.shows_all(cause.effect, cause.terms, model.data)
-        if not shown or (cause.effect in BENDING and base.positions.contradict(self.model.data, model.data)):
+        if not shown or (cause.effect in SHOWN and base.positions.contradict(self.model.data, model.data)):
             return Trial(cause, None, np.array([np.inf]))
         return Trial(cause, model, base.left_unseen(model))
 

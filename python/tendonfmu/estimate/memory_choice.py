@@ -154,7 +154,7 @@ class _Search:
         return structure, Estimator(structure.start.image, structure.group, structure.scale)
 
     def _numbers_of(self, estimator: Estimator, data: Data) -> Numbers:
-        """Return the unknowns z [u] of a description of the same structure, whose numbers may be rounded out of a box."""
+        """Return the unknowns z [u] of a description of this structure, whose numbers may be rounded out of a box."""
         numbers = estimator.unknown_values(self._finger.with_data(data).model.instance().values())
         ends = np.array([(each.lower, each.upper) for each in estimator.unknowns])
         return np.asarray(np.clip(numbers, *ends.T))
