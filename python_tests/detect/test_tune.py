@@ -31,6 +31,7 @@ from tendonfmu.detect.learning import (
     weights_of,
 )
 from tendonfmu.detect.noise import Residuals, bias_noise, deviation, drift_variance, time_constant
+from tendonfmu.detect.tune_report import sentence
 from tendonfmu.detect.tuning import QUARTERS, ContactTuning, TuneWarning, groups_of, pushed_part, size_found
 from tendonfmu.errors import InputError
 from tendonfmu.files.tables import read_table, write_table
@@ -269,6 +270,9 @@ def test_the_demo_is_tuned(tuned: Path) -> None:
     assert [round(each["mean_force"]) for each in report["pretensions"]] == [10, 40]
     assert report["sentence"].startswith("At most 200 alarms an hour were asked for; ")
     assert report["sentence"].endswith("are found within 60 ms, nine of ten.")
+    assert "confidence" not in report["sentence"]
+    many = report | {"kept_out": report["kept_out"] | {"interval": [250.0, 400.0]}}
+    assert "of motion that was kept out, with 95 % confidence more than 250 an hour. Pushes" in sentence(many)
     assert [file.name for file in (tuned / "fig").iterdir()] == ["tuning.html"]
 
 

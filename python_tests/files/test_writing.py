@@ -51,6 +51,10 @@ def test_numbers_agree_with_their_words_and_sentences_are_told_once() -> None:
     alone = ["c.csv: time: 1 gap, the first of 0.7 s"]
     kinds = by_kind([*alike, *alone, *alike])
     assert [sentences for _, sentences in kinds] == [alike, alone] and kinds[1][0] == alone[0]
+    ((told, _),) = by_kind(
+        [f"{file}: tendon_position[1]: {k} mm off; probably a slip; set it" for k, file in enumerate("ab")]
+    )
+    assert told == "tendon_position[1]: 1 column of 2 files, the first: 0 mm off; probably a slip; set it"
 
 
 def test_an_error_leaves_nothing(tmp_path: Path) -> None:

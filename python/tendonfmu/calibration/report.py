@@ -278,8 +278,8 @@ def record_next(lacks: Mapping[str, Any], tuned: Mapping[str, Any]) -> list[str]
     found = []
     if tuned["more_minutes"]:
         found.append(
-            f"{tuned['more_minutes']:.0f} min more of free motion: it then shows whether "
-            f"{tuned['false_alarms_per_hour']:g} false alarms an hour are kept"
+            f"{tuned['more_minutes']:.0f} min more of free motion: bounds that keep to "
+            f"{tuned['false_alarms_per_hour']:g} false alarms an hour are an extrapolation so far"
         )
     if len(tuned["pretensions"]) == 1:
         found.append("the same motion at another pretension: the growth with the force is not known yet")

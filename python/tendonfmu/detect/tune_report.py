@@ -149,12 +149,14 @@ def sentence(report: TuneReport) -> str:
     minutes = found["minutes"]
     long = f"{minutes / 60.0:.1f} h" if minutes >= 60.0 else f"{minutes:.2g} min"
     alarms = "none" if found["alarms"] == 0 else f"{found['alarms']}"
+    asked, least = report["false_alarms_per_hour"], found["interval"][0]
+    more = f", with 95 % confidence more than {least:.0f} an hour" if least is not None and least > asked else ""
     pushed, joint = least_sensitive(report["joints"], pushes["torque"])
     ending = f"{joint} are found within {1e3 * pushes['within_s']:.0f} ms, nine of ten."
     sized = "No pushes at" if pushed is None else f"Pushes of more than {1e3 * pushed:.3g} mN·m at"
     return (
-        f"At most {report['false_alarms_per_hour']:g} alarms an hour were asked for; {alarms} in {long} of motion that "
-        f"was kept out. {sized} {ending}"
+        f"At most {asked:g} alarms an hour were asked for; {alarms} in {long} of motion that was kept out{more}. "
+        f"{sized} {ending}"
     )
 
 

@@ -193,7 +193,8 @@ def _of_kind(probably: str, alike: Sequence[str]) -> str:
         return f"{first} (and {len(alike) - 1} more of this kind)"
     files, columns = ({sentence.split(": ", 2)[k] for sentence in alike} for k in (0, 1))
     of = f"{counted(len(columns), 'column')} of {counted(len(files), 'file')}"
-    return f"{', '.join(sorted(columns)[:4])}: {of}: probably {probably}"
+    seen = first.split(": ", 2)[2].partition("; probably ")[0]
+    return f"{', '.join(sorted(columns)[:4])}: {of}, the first: {seen}; probably {probably}"
 
 
 def html_template(name: str) -> jinja2.Template:
