@@ -1,4 +1,4 @@
-"""What happens to commands that are killed, and on machines that have no room left?"""
+"""What happens to commands that are killed?"""
 
 from __future__ import annotations
 
@@ -6,14 +6,12 @@ import contextlib
 import json
 import os
 import random
-import resource
 import shutil
 import signal
 import subprocess
 import sys
 import time
 import zipfile
-from collections.abc import Callable
 from pathlib import Path
 
 import pandas as pd
@@ -26,14 +24,10 @@ COMMAND = [sys.executable, "-m", "tendonfmu"]
 SECONDS = 12.0  # of motion: commands have to end within seconds
 COMMANDS: dict[str, list[str]] = {
     "build": ["build", "finger.json", "-o", "out/finger.fmu"],
-    "run": ["run", "finger.json", "free.parquet", "-o", "out/free.csv"],
-    "run to Parquet": ["run", "finger.json", "free.parquet", "-o", "out/free.parquet"],
-    "excite": ["excite", "finger.json", "-o", "out/motion.csv", "--duration", "20"],
     "fit": ["fit", "finger.json", "free.parquet", "-o", "out/fitted.json", "--report", "out/report.json"],
     "diagnose": ["diagnose", "finger.json", "free.parquet", "-o", "out/diagnosis"],
     "calibrate": ["calibrate", "finger.json", "free.parquet", "-o", "out/calibrated"],
 }
-KILLED = ("build", "fit", "diagnose", "calibrate")
 KILLS = 50  # of each
 
 
@@ -103,7 +97,7 @@ def kills(folder: Path, _workers: int) -> Figures:
     """kill -9 at random, and as a file is being written: no half file, and the command goes on afterwards."""
     chance, total = random.Random(1), 0
     wrong: list[str] = []
-    for name in KILLED:
+    for name in COMMANDS:
         words, work = COMMANDS[name], folder / name
         prepare(work)
         began = time.monotonic()
@@ -123,76 +117,4 @@ def kills(folder: Path, _workers: int) -> Figures:
     return {"kills": total, "wrong": wrong, "faults": len(wrong)}
 
 
-# --- no room ----------------------------------------------------------------------------------------------------------
-
-
-def refused(folder: Path, command: list[str], limit: Callable[[], None] | None, of_memory: bool) -> str:
-    """What came of a command that has no room: "refused" in one line, "ended", "lost", or what is wrong.
-
-    With little memory it may be lost: a library ends the process or waits for threads that it could not start
-    (OpenBLAS), or Python cannot begin.
-    """
-    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
-    try:
-        done = subprocess.run(
-            command, cwd=folder, capture_output=True, text=True, preexec_fn=limit, env=environment, timeout=120
-        )
-    except subprocess.TimeoutExpired:
-        return "lost" if of_memory else "not ended after 120 s"
-    halves = [file for file, path in results(folder / "out").items() if not is_whole(path)]
-    if halves:
-        return f"half of {halves[0]}"
-    if done.returncode == 0:
-        return "ended"
-    if of_memory and done.returncode not in (2, 3):
-        return "lost"
-    lines = done.stderr.strip().splitlines()
-    if done.returncode == 2 and len(lines) == 1 and lines[0].startswith("tendonfmu: "):
-        return "refused"
-    return f"status {done.returncode}: {len(lines)} lines: {' / '.join(lines)[:300]}"
-
-
-def on_a_small_disk(options: str, then: str, words: list[str]) -> list[str]:
-    """The command with a file system of its own at out/: in a mount namespace, gone when the command has ended."""
-    script = f'mount -t tmpfs -o {options} tmpfs out && {then} exec "$@"'
-    return ["unshare", "-m", "sh", "-c", script, "sh", *COMMAND, *words, "--quiet"]
-
-
-def limited(kind: int, size: int) -> Callable[[], None]:
-    return lambda: resource.setrlimit(kind, (size, size))
-
-
-def trials(words: list[str]) -> list[tuple[str, list[str], Callable[[], None] | None]]:
-    """What a command is tried with: title, command, limit."""
-    plain = [*COMMAND, *words, "--quiet"]
-    small = [
-        (f"files of at most {size} bytes", plain, limited(resource.RLIMIT_FSIZE, size)) for size in (0, 1, 4096, 65536)
-    ]
-    disks = [(f"disk of {size}", on_a_small_disk(f"size={size}", "", words), None) for size in ("4k", "16k", "64k")]
-    disks.append(("read-only disk", on_a_small_disk("size=1m", "mount -o remount,ro out &&", words), None))
-    trial = ["unshare", "-m", "mount", "-t", "tmpfs", "tmpfs", "/mnt"]
-    if shutil.which("unshare") is None or subprocess.run(trial, capture_output=True).returncode:
-        disks = []  # not allowed to mount
-    return [
-        *small,
-        *disks,
-        *((f"{size} MiB of memory", plain, limited(resource.RLIMIT_AS, size << 20)) for size in (250, 350, 500, 700)),
-    ]
-
-
-def no_room(folder: Path, _workers: int) -> Figures:
-    work, answers = folder / "work", dict[str, str]()
-    for name, words in COMMANDS.items():
-        for title, command, limit in trials(words):
-            prepare(work)
-            answers[f"{name}, {title}"] = refused(work, command, limit, "memory" in title)
-    known = {answer: list(answers.values()).count(answer) for answer in ("refused", "ended", "lost")}
-    wrong = [f"{title}: {answer}" for title, answer in answers.items() if answer not in known]
-    return {"runs": len(answers), **known, "wrong": wrong, "faults": len(wrong)}
-
-
-NOTHING_WRONG = {"faults": (0, 0)}
-PARTS = {
-    "kills": Part(kills, minutes=11.0, headlines=NOTHING_WRONG),
-    "no_room": Part(no_room, minutes=5.0, headlines=NOTHING_WRONG),
-}
+PARTS = {"kills": Part(kills, minutes=11.0, headlines={"faults": (0, 0)})}
