@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "contact_bands.h"
+#include "effect_facts.h"
 #include "friction_law.h"
 #include "link_geometry.h"
 #include "model_image.h"
@@ -57,7 +58,6 @@ typedef struct friction_element {
 
 /* Places whose friction has a memory. */
 typedef struct friction_memory {
-  size_t elements;   /* side by side, 0: there is no memory */
   double compliance; /* of the cords, 1/k_c, m/N; 0: rigid */
   double stretch;    /* the same in the present step: 0 in the first */
   int relaxes;       /* some place has a relaxation time */
@@ -313,6 +313,11 @@ static inline double sum_of_lanes(const double of[4]) {
 /* Whether the description has any of these parts (MODEL_HAS_LINKS, …). */
 static inline int has_option(const tendonfmu_finger* finger, uint32_t options) {
   return (finger->shape.options & options) != 0;
+}
+
+/* How many elements of friction with a memory stand side by side at most; 0: there is none. */
+static inline size_t elements_of(const tendonfmu_finger* finger) {
+  return PRESLIDING_IS_LINKED ? finger->shape.elements : 0;
 }
 
 /* What a joint's bands remember. */

@@ -85,8 +85,10 @@ typedef struct key_row {
   unsigned char tunable, has_default;
   unsigned char count; /* key_count */
   uint16_t option; /* the bit of the model image without which it is not there; 0: always there */
-  double default_value;
 } key_row;
 
 /* The row of number `offset` of an item; not of ITEM_EXTENSION. */
 const key_row* key_row_of(model_item_kind kind, uint32_t offset);
+
+/* The value of one that has a default: no part of a program that reads no descriptions. */
+double key_default(const key_row* row);

@@ -325,6 +325,10 @@ static int check_extension(const unsigned char* table, uint32_t i, model_shape* 
   if (!effect) {
     return refuse_value(message, "model image: effect number", load_u32(row), "one that this version knows");
   }
+  if (!effect->action) {
+    return message_write(message, "model image with %s, which is not linked: expected bit %zu in TENDONFMU_EFFECTS",
+                         effect->name, (size_t)effect->id);
+  }
   if (!place_is_sound(effect, shape, place)) {
     return refuse_value(message, "model image: joint of an extension", place[0], "a place where such an effect can be");
   }
