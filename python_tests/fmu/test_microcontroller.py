@@ -22,17 +22,17 @@ ARRAY_USER = """
 #include "{header}"
 int main(void) {{ return {name}_image[0] == 'T' && {name}_image_size == sizeof {name}_image ? 0 : 1; }}
 """
-OF_ITS_EFFECTS = """
+TWO_FINGERS = """
 #include <stdio.h>
 #include <tendonfmu.h>
-#include "with_gravity.h"
-#include "with_inertia.h"
-static unsigned char memory[with_gravity_memory_size];
+#include "own.h"
+#include "other.h"
+static unsigned char memory[own_memory_size];
 int main(void) {
   char text[160];
-  const int own = tendonfmu_place(memory, sizeof memory, with_gravity_image, with_gravity_image_size, text, 160) != 0;
-  const int other = tendonfmu_place(memory, sizeof memory, with_inertia_image, with_inertia_image_size, text, 160) != 0;
-  printf("%d %d %s", own, other, text);
+  const int is_placed = tendonfmu_place(memory, sizeof memory, own_image, own_image_size, text, sizeof text) != 0;
+  const int is_refused = !tendonfmu_place(memory, sizeof memory, other_image, other_image_size, text, sizeof text);
+  printf("%d %d %s", is_placed, is_refused, text);
   return 0;
 }
 """
@@ -69,28 +69,31 @@ def test_command_writes_an_array(tmp_path: Path, call: Call) -> None:
     assert f"_memory_size = {report['memory_bytes']} }}" in (tmp_path / "finger.c").read_text()
 
 
-def test_only_the_effects_of_a_finger_are_linked(tmp_path: Path) -> None:
-    """By what the array says; an image with another effect is refused by the name of that."""
-    rows = {"gravity": {"effect": "gravity", "joint": 1, "sine": 0.1}}
-    rows["inertia"] = {"effect": "inertia", "joint": 1, "inertia": 1e-5}
-    for name, row in rows.items():
-        tf.build({**FINGER, "name": f"with_{name}", "extensions": [row]}, tmp_path / f"with_{name}.h", c_array=True)
-    effects = re.search(r"^#define with_gravity_effects (0x\w+)$", (tmp_path / "with_gravity.h").read_text(), re.M)
-    assert effects is not None
-    (tmp_path / "main.c").write_text(OF_ITS_EFFECTS)
-    core = ROOT / "runtime" / "core"
-    folders = [f"-I{folder}" for folder in (core, *(core / name for name in ("detect", "effects", "kernel")))]
-    flags = [*folders, f"-I{core.parent / 'include'}", '-DTENDONFMU_VERSION="1"', "-ffunction-sections"]
-    flags += [f"-DTENDONFMU_EFFECTS={effects[1]}", "-fdata-sections", "-Wl,--gc-sections"]
-    sources = [*sorted(core.glob("*.c")), *sorted(core.glob("*/*.c")), tmp_path / "main.c"]
-    program = tmp_path / "program"
-    subprocess.run(["cc", "-O1", *flags, *sources, "-lm", "-o", program], check=True)
-    printed = subprocess.run([program], capture_output=True, text=True, check=True).stdout
-    assert printed == "1 0 model image with inertia, which is not linked: expected bit 3 in TENDONFMU_EFFECTS"
+@pytest.mark.parametrize(
+    ("part", "refusal"),
+    [
+        ({"extensions": [{"effect": "inertia", "joint": 1, "inertia": 1e-5}]},
+         "model image with inertia, which is not linked: expected bit 3 in TENDONFMU_EFFECTS"),
+        ({"sensor_fault": {}}, "model image: option bits 8, expected none beyond TENDONFMU_OPTIONS"),
+    ],
+)  # fmt: skip
+def test_program_has_what_its_finger_has(tmp_path: Path, part: dict[str, object], refusal: str) -> None:
+    """As the array of the finger says; an image of what is not linked is refused."""
+    gravity = {"extensions": [{"effect": "gravity", "joint": 1, "sine": 0.1}]}
+    for name, parts in (("own", gravity), ("other", part)):
+        tf.build({**FINGER, "name": name, **parts}, tmp_path / f"{name}.h", c_array=True)
+    linked = re.findall(r"^#define own_(\w+) (0x\w+)", (tmp_path / "own.h").read_text(), re.M)
+    (tmp_path / "main.c").write_text(TWO_FINGERS)
+    core, program = ROOT / "runtime" / "core", tmp_path / "program"
+    flags = [f"-I{folder}" for folder in (core.parent / "include", core, *core.glob("*/"))]
+    flags += ['-DTENDONFMU_VERSION="1"', *(f"-DTENDONFMU_{name.upper()}={bits}" for name, bits in linked)]
+    flags += ["-O1", "-ffunction-sections", "-fdata-sections", "-Wl,--gc-sections"]
+    sources = [*core.glob("*.c"), *core.glob("*/*.c"), tmp_path / "main.c"]
+    subprocess.run(["cc", *flags, *sources, "-lm", "-o", program], check=True)
+    assert subprocess.run([program], capture_output=True, text=True, check=True).stdout == f"1 1 {refusal}"
     names = subprocess.run(["nm", program], capture_output=True, text=True, check=True).stdout
     assert "gravity_action" in names
-    assert "inertia_action" not in names
-    assert "find_decay" not in names  # nor what only presliding needs
+    assert not [name for name in ("inertia_action", "find_decay", "watch_sensors", "begin_bands") if name in names]
 
 
 def test_what_an_array_cannot_be_is_refused(tmp_path: Path) -> None:

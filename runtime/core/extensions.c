@@ -93,7 +93,6 @@ static effect_sample sample_of_finger(const tendonfmu_finger* f) {
   return (effect_sample){.joints = f->joints,
                          .tendons = f->tendons,
                          .lanes = f->tendon_lanes,
-                         .source = source_of(f),
                          .moment_arm = f->derived.moment_arm,
                          .rest_angle = f->derived.cover_rest,
                          .axis_cosine = f->derived.axis_cosine,

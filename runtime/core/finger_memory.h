@@ -312,7 +312,7 @@ static inline double sum_of_lanes(const double of[4]) {
 
 /* Whether the description has any of these parts (MODEL_HAS_LINKS, …). */
 static inline int has_option(const tendonfmu_finger* finger, uint32_t options) {
-  return (finger->shape.options & options) != 0;
+  return (finger->shape.options & options & (TENDONFMU_OPTIONS)) != 0;
 }
 
 /* How many elements of friction with a memory stand side by side at most; 0: there is none. */

@@ -76,51 +76,14 @@ static const double default_values[sizeof rows / sizeof rows[0]] = {
   [51] = 0.5, /* sensor_fault.recovery_time */
 };
 
-/* where the rows of an item begin, and how many there are: a law has four, of which an asymmetric one has two each */
-static const struct { unsigned char first, count; } items[ITEM_EXTENSION] = {
-  [ITEM_COVER] = {0, 2},
-  [ITEM_JOINT_FRICTION] = {2, 4},
-  [ITEM_LOAD_FRICTION] = {6, 4},
-  [ITEM_STIFFNESS] = {10, 1},
-  [ITEM_MOMENT_ARMS] = {11, 1},
-  [ITEM_TENDON_ZERO] = {12, 1},
-  [ITEM_PULLEY_FRICTION] = {13, 4},
-  [ITEM_EDGE_ANGLES] = {17, 1},
-  [ITEM_EDGE_FRICTION] = {18, 4},
-  [ITEM_TENDON_THRESHOLD] = {22, 1},
-  [ITEM_JOINT_THRESHOLD] = {23, 1},
-  [ITEM_FILTER_CUTOFF] = {24, 1},
-  [ITEM_DRIFT_VARIANCE] = {25, 1},
-  [ITEM_NOISE_STD] = {26, 1},
-  [ITEM_NOISE_STD_PER_FORCE] = {27, 1},
-  [ITEM_INITIAL_VARIANCE] = {28, 1},
-  [ITEM_FORGET_RATE] = {29, 1},
-  [ITEM_INITIAL_TORQUE] = {30, 1},
-  [ITEM_NOISE_TIME] = {31, 1},
-  [ITEM_CONTACT_THRESHOLD] = {32, 1},
-  [ITEM_CONTACT_PER_FORCE] = {33, 1},
-  [ITEM_BAND_NOISE] = {34, 1},
-  [ITEM_BAND_FRICTION] = {35, 1},
-  [ITEM_BAND_FRICTION_LIMIT] = {36, 1},
-  [ITEM_BAND_MOTOR_LOAD] = {37, 1},
-  [ITEM_BAND_FRICTION_CHANGE] = {38, 1},
-  [ITEM_BAND_FRICTION_RESERVE] = {39, 1},
-  [ITEM_DEVIATION] = {40, 1},
-  [ITEM_DEVIATION_PER_FORCE] = {41, 1},
-  [ITEM_LINK_AXIS] = {42, 1},
-  [ITEM_LINK_OFFSET] = {43, 1},
-  [ITEM_TIP] = {44, 1},
-  [ITEM_FAULT_HOLD_TIME] = {45, 1},
-  [ITEM_FAULT_FORCE_RESOLUTION] = {46, 1},
-  [ITEM_FAULT_POSITION_RESOLUTION] = {47, 1},
-  [ITEM_FAULT_JUMP_MARGIN] = {48, 1},
-  [ITEM_FAULT_SPRING_MARGIN] = {49, 1},
-  [ITEM_FAULT_LONGEST_STAND] = {50, 1},
-  [ITEM_FAULT_RECOVERY_TIME] = {51, 1},
+/* where the rows of each item begin, and after the last: a law has four, of which an asymmetric one has two each */
+static const unsigned char first_row[ITEM_EXTENSION + 1] = {
+0, 2, 6, 10, 11, 12, 13, 17, 18, 22, 23, 24, 25, 26, 27, 28, 29, 30, 31, 32, 33, 34, 35, 36, 37, 38, 39, 40, 41, 42, 43, 44, 45, 46, 47, 48, 49, 50, 51, 52
 };
 
 const key_row* key_row_of(model_item_kind kind, uint32_t offset) {
-  return &rows[items[kind].first + offset % items[kind].count];
+  const uint32_t first = first_row[kind], count = first_row[kind + 1] - first;
+  return &rows[first + offset % count];
 }
 
 double key_default(const key_row* row) {

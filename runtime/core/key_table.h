@@ -28,6 +28,11 @@ enum {
   MODEL_OPTION_BITS = 1023
 };
 
+/* Those whose code is linked: all, unless a program's build says which its fingers have. */
+#ifndef TENDONFMU_OPTIONS
+#define TENDONFMU_OPTIONS MODEL_OPTION_BITS
+#endif
+
 /* The parameters come in items, in this order: joints, tendons, finger, extensions. */
 typedef enum model_item_kind {
   ITEM_COVER, /* joints[j].cover */

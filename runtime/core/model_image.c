@@ -206,6 +206,9 @@ static int read_counts(const void* image, size_t image_size, model_shape* shape,
   if (shape->options & ~(uint32_t)MODEL_OPTION_BITS) {
     return refuse_value(message, "model image: option bits", shape->options, "a sum of known ones");
   }
+  if (shape->options & ~(uint32_t)(TENDONFMU_OPTIONS)) {
+    return refuse_value(message, "model image: option bits", shape->options, "none beyond TENDONFMU_OPTIONS");
+  }
   if ((shape->options & (MODEL_DETECTS_BY_BANDS | MODEL_WATCHES_MOTORS)) == MODEL_WATCHES_MOTORS) {
     return refuse_value(message, "model image: option bits", shape->options, "ones that go together");
   }

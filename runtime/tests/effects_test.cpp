@@ -74,7 +74,6 @@ struct Effect {
     seen.tendons = tendons;
     seen.lanes = lanes;
     seen.first = sample.first;
-    seen.source = 3;
     seen.time = sample.time;
     seen.step = sample.step;
     seen.angle = sample.angle.data();

@@ -297,11 +297,12 @@ _BYTES_A_LINE = 20
 
 _TEXT = """\
 /* The finger "{title}" with {joints} joints and {tendons} tendons, for tendonfmu_place(): the model image, bytes of
- * memory that are enough on every machine, and TENDONFMU_EFFECTS for a program that has these effects alone: {effects}.
- * Made by `tendonfmu build --c-array`, version {version}. */
+ * memory that are enough on every machine, and TENDONFMU_EFFECTS and TENDONFMU_OPTIONS of a program for it alone. Made by
+ * `tendonfmu build --c-array`, version {version}. */
 #include <stddef.h>
 
-#define {name}_effects 0x{bits:x}
+#define {name}_effects 0x{effects:x} /* {effect_names} */
+#define {name}_options 0x{options:x}
 
 enum {{ {name}_memory_size = {memory} }};
 
@@ -323,8 +324,9 @@ def write_c_array(finger: Finger, output: Path) -> Path:
         tendons=len(finger.data["tendons"]),
         version=native.version(),
         name=model_identifier(finger.name),
-        effects=", ".join(sorted({row["effect"] for row in finger.data.get("extensions", [])})) or "none",
-        bits=_effect_bits(image),
+        effects=_effect_bits(image),
+        effect_names=", ".join(sorted({row["effect"] for row in finger.data.get("extensions", [])})) or "none",
+        options=struct.unpack_from("<I", image, 40)[0],
         memory=native.memory_size(image),
         size=len(image),
         rows="\n".join(f"    {''.join(f'{byte},' for byte in line)}" for line in lines),

@@ -61,7 +61,6 @@ static inline int is_everywhere(effect_place place) {
 typedef struct effect_sample {
   size_t joints, tendons, lanes;
   int first;                                /* 1: the first sample */
-  int source;                               /* kinematics source 1, 2, 3 */
   double time, step;                        /* s; step is meaningless at the first sample */
   const double* angle;                      /* [n] rad */
   const double* velocity;                   /* [n] rad/s */

@@ -361,8 +361,10 @@ static void one_minus_exponentials(const double* x, double* values, size_t count
   }
 }
 
-#define STEP_KERNEL(name)                                                                                \
-  {                                                                                                      \
-    name, one_minus_exponentials, multiply, tendon_velocities, watch_tendons, follow_bands, weigh_bands, \
-        find_friction, remember_slots                                                                    \
+#define LINKED_WITH(option, function) ((TENDONFMU_OPTIONS) & (option) ? (function) : NULL)
+#define STEP_KERNEL(name)                                                                                          \
+  {                                                                                                                \
+    name, one_minus_exponentials, multiply, tendon_velocities, LINKED_WITH(MODEL_HAS_SENSOR_FAULT, watch_tendons), \
+        LINKED_WITH(MODEL_DETECTS_BY_BANDS, follow_bands), LINKED_WITH(MODEL_DETECTS_BY_BANDS, weigh_bands),       \
+        find_friction, remember_slots                                                                              \
   }
