@@ -297,7 +297,7 @@ _BYTES_A_LINE = 20
 
 _TEXT = """\
 /* The finger "{title}" with {joints} joints and {tendons} tendons, for tendonfmu_place(): the model image, bytes of
- * memory that are enough on every machine, and TENDONFMU_EFFECTS and TENDONFMU_OPTIONS of a program for it alone. Made by
+ * memory that are enough on every machine, TENDONFMU_EFFECTS and TENDONFMU_OPTIONS of a program for it alone. Made by
  * `tendonfmu build --c-array`, version {version}. */
 #include <stddef.h>
 
