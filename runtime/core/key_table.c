@@ -60,22 +60,6 @@ static const key_row rows[] = {
   {"sensor_fault.recovery_time", "s", 0.0, 1000000000.0, 0, 1, 1, KEY_ONE, MODEL_HAS_SENSOR_FAULT},
 };
 
-static const double default_values[sizeof rows / sizeof rows[0]] = {
-  [22] = 0.0005, /* velocity_threshold.tendon */
-  [23] = 0.01, /* velocity_threshold.joint */
-  [24] = 20.0, /* velocity_filter_cutoff */
-  [25] = 1e-06, /* bias.drift_variance */
-  [26] = 0.01, /* bias.noise_std */
-  [29] = 5.0, /* bias.forget_rate */
-  [45] = 0.05, /* sensor_fault.hold_time */
-  [46] = 0.01, /* sensor_fault.force_resolution */
-  [47] = 2e-06, /* sensor_fault.position_resolution */
-  [48] = 1.0, /* sensor_fault.jump_margin */
-  [49] = 1.0, /* sensor_fault.spring_margin */
-  [50] = 1000000000.0, /* sensor_fault.longest_stand */
-  [51] = 0.5, /* sensor_fault.recovery_time */
-};
-
 /* where the rows of each item begin, and after the last: a law has four, of which an asymmetric one has two each */
 static const unsigned char first_row[ITEM_EXTENSION + 1] = {
 0, 2, 6, 10, 11, 12, 13, 17, 18, 22, 23, 24, 25, 26, 27, 28, 29, 30, 31, 32, 33, 34, 35, 36, 37, 38, 39, 40, 41, 42, 43, 44, 45, 46, 47, 48, 49, 50, 51, 52
@@ -84,8 +68,4 @@ static const unsigned char first_row[ITEM_EXTENSION + 1] = {
 const key_row* key_row_of(model_item_kind kind, uint32_t offset) {
   const uint32_t first = first_row[kind], count = first_row[kind + 1] - first;
   return &rows[first + offset % count];
-}
-
-double key_default(const key_row* row) {
-  return default_values[row - rows];
 }

@@ -94,6 +94,3 @@ typedef struct key_row {
 
 /* The row of number `offset` of an item; not of ITEM_EXTENSION. */
 const key_row* key_row_of(model_item_kind kind, uint32_t offset);
-
-/* The value of one that has a default: no part of a program that reads no descriptions. */
-double key_default(const key_row* row);

@@ -421,8 +421,7 @@ double default_value(const model_item& item, std::uint32_t offset) {
   if (item.kind == ITEM_EXTENSION) {
     return effect_expectation_of(item.effect, offset)->missing_value;
   }
-  const key_row* row = key_row_of(item.kind, offset);
-  return row->has_default ? key_default(row) : NAN;
+  return key_row_of(item.kind, offset)->has_default ? default_of(item.kind) : NAN;
 }
 
 double read_value(const json_node& document, const model_item& item, std::uint32_t index) {
