@@ -18,7 +18,7 @@ enum { EFFECT_MAX_PARAMETERS = 4 };
 #ifndef TENDONFMU_EFFECTS
 #define TENDONFMU_EFFECTS UINT64_MAX
 #endif
-#define EFFECT_IS_LINKED(id) ((TENDONFMU_EFFECTS) >> id & 1)
+#define EFFECT_IS_LINKED(id) ((uint64_t)(TENDONFMU_EFFECTS) >> id & 1)
 
 #define EFFECT_NOWHERE 0xffffffffu
 
