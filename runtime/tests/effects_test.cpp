@@ -214,6 +214,7 @@ TEST(Table, HasDifferentNamesAndNumbers) {
     EXPECT_TRUE(ids.insert(effect->id).second) << effect->name;
     EXPECT_EQ(effect_by_id(effect->id), effect);
     EXPECT_LE(effect->parameter_count, std::uint32_t{EFFECT_MAX_PARAMETERS});
+    EXPECT_LT(effect->id, 64) << effect->name << ": a bit of TENDONFMU_EFFECTS";
     const effect_action& acts = *effect->action;
     EXPECT_EQ(acts.state_count || acts.memory_count, acts.advance || acts.kind == EFFECT_SIGNAL) << effect->name;
     for (std::uint32_t p = 0; p < effect->parameter_count; ++p) {
