@@ -110,8 +110,7 @@ static char* join(const char* folder, const char* name) {
   const size_t length = strlen(folder), room = strlen(name) + 2;
   char* path = malloc(length + room);
   if (path) {
-    memcpy(path, folder, length + 1);
-    snprintf(path + length, room, "%s%s", length && folder[length - 1] == '/' ? "" : "/", name);
+    snprintf(path, length + room, "%s%s%s", folder, length && folder[length - 1] == '/' ? "" : "/", name);
   }
   return path;
 }

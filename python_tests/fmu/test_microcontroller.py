@@ -22,6 +22,20 @@ ARRAY_USER = """
 #include "{header}"
 int main(void) {{ return {name}_image[0] == 'T' && {name}_image_size == sizeof {name}_image ? 0 : 1; }}
 """
+TWO_FINGERS = """
+#include <stdio.h>
+#include <tendonfmu.h>
+#include "own.h"
+#include "other.h"
+static unsigned char memory[own_memory_size];
+int main(void) {
+  char text[160];
+  const int is_placed = tendonfmu_place(memory, sizeof memory, own_image, own_image_size, text, sizeof text) != 0;
+  const int is_refused = !tendonfmu_place(memory, sizeof memory, other_image, other_image_size, text, sizeof text);
+  printf("%d %d %s", is_placed, is_refused, text);
+  return 0;
+}
+"""
 # The heap, files, conversions of text, functions of libm with bits of their own, and divisions of 64 bits.
 UNWANTED = {
     *("malloc", "calloc", "realloc", "free", "_sbrk", "fopen", "strtod", "exp", "log", "pow", "sin", "cos"),
@@ -53,6 +67,33 @@ def test_command_writes_an_array(tmp_path: Path, call: Call) -> None:
     report = json.loads(answer.out)
     assert report["image_bytes"] == len(tf.read_finger(FINGER).image)
     assert f"_memory_size = {report['memory_bytes']} }}" in (tmp_path / "finger.c").read_text()
+
+
+@pytest.mark.parametrize(
+    ("part", "refusal"),
+    [
+        ({"extensions": [{"effect": "inertia", "joint": 1, "inertia": 1e-5}]},
+         "model image with inertia, which is not linked: expected bit 3 in TENDONFMU_EFFECTS"),
+        ({"sensor_fault": {}}, "model image: option bits 8, expected none beyond TENDONFMU_OPTIONS"),
+    ],
+)  # fmt: skip
+def test_program_has_what_its_finger_has(tmp_path: Path, part: dict[str, object], refusal: str) -> None:
+    """As the array of the finger says; an image of what is not linked is refused."""
+    gravity = {"extensions": [{"effect": "gravity", "joint": 1, "sine": 0.1}]}
+    for name, parts in (("own", gravity), ("other", part)):
+        tf.build({**FINGER, "name": name, **parts}, tmp_path / f"{name}.h", c_array=True)
+    linked = re.findall(r"^#define own_(\w+) (0x\w+)", (tmp_path / "own.h").read_text(), re.M)
+    (tmp_path / "main.c").write_text(TWO_FINGERS)
+    core, program = ROOT / "runtime" / "core", tmp_path / "program"
+    flags = [f"-I{folder}" for folder in (core.parent / "include", core, *core.glob("*/"))]
+    flags += ['-DTENDONFMU_VERSION="1"', *(f"-DTENDONFMU_{name.upper()}={bits}" for name, bits in linked)]
+    flags += ["-O1", "-ffunction-sections", "-fdata-sections", "-Wl,--gc-sections"]
+    sources = [*core.glob("*.c"), *core.glob("*/*.c"), tmp_path / "main.c"]
+    subprocess.run(["cc", *flags, *sources, "-lm", "-o", program], check=True)
+    assert subprocess.run([program], capture_output=True, text=True, check=True).stdout == f"1 1 {refusal}"
+    names = subprocess.run(["nm", program], capture_output=True, text=True, check=True).stdout
+    assert "gravity_action" in names
+    assert not [name for name in ("inertia_action", "find_decay", "watch_sensors", "begin_bands") if name in names]
 
 
 def test_what_an_array_cannot_be_is_refused(tmp_path: Path) -> None:

@@ -56,7 +56,7 @@ def test_a_default_is_a_fact_of_one_table(generator: ModuleType) -> None:
         "docs/reference/description_keys.md",
         "python/tendonfmu/schema/description_numbers.json",
         "python/tendonfmu/schema/finger.schema.json",
-        "runtime/core/key_table.c",
+        "runtime/description/description_keys.cpp",
     }
 
 

@@ -149,7 +149,7 @@ BIASES: dict[str, Description] = {
     "initial_variance": {"initial_variance": 4e-3},
     "noise_per_force": {"noise_std_per_force": 4e-4},
     "noise_time": {"noise_time": 0.02},
-    "initial_torque": {"initial_torque": [0.02, -0.01], "initial_variance": 1e-6},
+    "known initial_torque": {"initial_torque": [0.02, -0.01], "initial_variance": 0.0},
     "initial_torque of default variance": {"initial_torque": [0.02, -0.01]},
     "no wandering": {"drift_variance": 0.0},
     "known start": {"initial_variance": 0.0},

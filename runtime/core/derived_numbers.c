@@ -73,7 +73,7 @@ static void pack_edge(derivation* d, const model_item* item) {
 
 /* what is a copy: to a number of the finger, or to a row of joints */
 static const struct {
-  size_t setting, row; /* one of them 0 */
+  uint16_t setting, row; /* one of them 0 */
 } copies[ITEM_EXTENSION + 1] = {
     [ITEM_TENDON_THRESHOLD] = SETTING(tendon_threshold),
     [ITEM_JOINT_THRESHOLD] = SETTING(joint_threshold),

@@ -120,7 +120,7 @@ static dual friction_at(const linearisation* l, const effect_laws* laws, size_t 
 static dual remembered_loss(const tendonfmu_finger* f, size_t at, double motion, double limit) {
   const double turned = f->remembered.scalar[STATE_FIRST_SAMPLE] != 0.0 ? 0.0 : motion;
   double force = 0.0;
-  for (size_t e = 0; e < f->memory.elements; ++e) {
+  for (size_t e = 0; e < elements_of(f); ++e) {
     force += f->remembered.element[e * 2 * f->slots + at];
   }
   return (dual){force, f->remembered.by_turning[at] * turned + f->remembered.by_limit[at] * limit};
@@ -305,7 +305,7 @@ static void linearise_extensions(linearisation* l, const double* force) {
     if (row->action->slope) {
       row->action->slope(row, &sample, &direction, slope);
     }
-    if (row->action->slot && f->memory.elements) {
+    if (row->action->slot && elements_of(f)) {
       add_followed(l, row, &sample, slope);
     }
   }
@@ -385,7 +385,7 @@ static void write_joint(const linearisation* l, size_t j, const tendonfmu_output
 
 static void linearise_torques(linearisation* l, const double* force) {
   linearise_forces(l, force);
-  if (l->finger->memory.elements) {
+  if (elements_of(l->finger)) {
     linearise_limits(l, force);
   }
   linearise_joints(l);

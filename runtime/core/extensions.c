@@ -60,7 +60,7 @@ static void clear_grips(tendonfmu_finger* f) {
   for (size_t slot = 0; slot < f->slots; ++slot) {
     f->scratch.grip[slot] = 1.0;
     f->scratch.grip_slope[slot] = 0.0;
-    f->scratch.bias_grip[slot] = f->memory.elements && f->memory.remembers[slot] != 0.0 ? 0.0 : 1.0;
+    f->scratch.bias_grip[slot] = elements_of(f) && f->memory.remembers[slot] != 0.0 ? 0.0 : 1.0;
   }
 }
 
@@ -82,7 +82,7 @@ void find_extensions(tendonfmu_finger* f) {
   find_axis_cosines(f);
   find_memory(f);
   clear_grips(f);
-  rows->gripped = rows->frictions > 0 || f->memory.elements > 0;
+  rows->gripped = rows->frictions > 0 || elements_of(f) > 0;
 }
 
 /* --- what the others remember ---------------------------------------------------------------------------------------
@@ -93,7 +93,6 @@ static effect_sample sample_of_finger(const tendonfmu_finger* f) {
   return (effect_sample){.joints = f->joints,
                          .tendons = f->tendons,
                          .lanes = f->tendon_lanes,
-                         .source = source_of(f),
                          .moment_arm = f->derived.moment_arm,
                          .rest_angle = f->derived.cover_rest,
                          .axis_cosine = f->derived.axis_cosine,
@@ -117,7 +116,7 @@ void advance_extensions(tendonfmu_finger* f, double time, double step) {
     if (row->action->advance) {
       row->action->advance(row, sample);
     }
-    if (row->action->slot && f->memory.elements) {
+    if (row->action->slot && elements_of(f)) {
       follow_elements(f, row, row->action->size(row, sample));
     }
   }

@@ -40,7 +40,7 @@ effect_sample remembered_sample(const tendonfmu_finger* finger);
 
 /* 1 where friction has a memory: it never sticks. */
 static inline int remembers_at(const tendonfmu_finger* finger, size_t slot) {
-  return finger->memory.elements && finger->memory.remembers[slot] != 0.0;
+  return elements_of(finger) && finger->memory.remembers[slot] != 0.0;
 }
 
 /* Fills finger->memory from the rows of presliding and cord_stretch; whenever numbers were derived anew. */

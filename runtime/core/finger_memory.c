@@ -83,11 +83,11 @@ const finger_row state_rows[] = {
     {ROW(remembered.event), .unit = OF_SLOTS, .low = MINUS | THREE, .high = ONE, .whole = 1},
     {ROW(remembered.stuck_since), .unit = OF_SLOTS, .low = MINUS | A_TIME, .high = A_SQUARE, .spare = 1},
     {ROW(remembered.last_stuck), .unit = OF_SLOTS, INSTANT},
-    {ROW(remembered.jumped), .unit = OF_JOINTS, .when = WITH_BANDS, WITHIN(A_SUM)},
-    {ROW(remembered.bands), .unit = OF_JOINTS, .count = sizeof(band_memory) / sizeof(double), .when = WITH_BANDS,
-     WITHIN(TWO_SUMS), .spare = 1},
-    {SENSORS(remembered.sensor), .unit = OF_TENDONS, .when = WITH_SENSOR_FAULT, .parts = sensors},
-    {ROW(remembered.watch), .unit = OF_JOINTS, .when = WITH_SENSOR_FAULT, .high = TWO, .whole = 1},
+    {ROW(remembered.jumped), .unit = OF_JOINTS, .when = MODEL_DETECTS_BY_BANDS, WITHIN(A_SUM)},
+    {ROW(remembered.bands), .unit = OF_JOINTS, .count = sizeof(band_memory) / sizeof(double),
+     .when = MODEL_DETECTS_BY_BANDS, WITHIN(TWO_SUMS), .spare = 1},
+    {SENSORS(remembered.sensor), .unit = OF_TENDONS, .when = MODEL_HAS_SENSOR_FAULT, .parts = sensors},
+    {ROW(remembered.watch), .unit = OF_JOINTS, .when = MODEL_HAS_SENSOR_FAULT, .high = TWO, .whole = 1},
     {ROW(remembered.element), .unit = OF_ELEMENTS, .count = 2, .when = WITH_MEMORY, WITHIN(A_SUM), .spare = 1},
     {ROWS(remembered.by_turning, remembered.by_limit), .unit = OF_SLOTS, .count = 2, .when = WITH_MEMORY,
      WITHIN(ANY_NUMBER), .spare = 1},
@@ -98,8 +98,8 @@ const size_t state_row_count = sizeof state_rows / sizeof state_rows[0];
 
 /* what the last of these become with this sample, in the same order */
 static const finger_row next_rows[] = {
-    {SENSORS(scratch.sensor), .unit = OF_TENDONS, .when = WITH_SENSOR_FAULT},
-    {ROW(scratch.watch), .unit = OF_JOINTS, .when = WITH_SENSOR_FAULT},
+    {SENSORS(scratch.sensor), .unit = OF_TENDONS, .when = MODEL_HAS_SENSOR_FAULT},
+    {ROW(scratch.watch), .unit = OF_JOINTS, .when = MODEL_HAS_SENSOR_FAULT},
     {ROW(scratch.element), .unit = OF_ELEMENTS, .count = 2, .when = WITH_MEMORY},
     {ROWS(scratch.by_turning, scratch.by_limit), .unit = OF_SLOTS, .count = 2, .when = WITH_MEMORY},
     {ROW(scratch.tension), .unit = OF_SLOTS, .count = 2, .when = WITH_CORDS},
@@ -117,9 +117,9 @@ static const finger_row prepared_rows[] = {
     {ROW(derived.edge_angle), .unit = OF_ANGLES},
     {ROWS(derived.joint_law, derived.load_law), .unit = OF_JOINTS, .count = LAW_NUMBERS},
     {ROWS(derived.cover_stiffness, derived.deviation_per_force), .unit = OF_JOINTS},
-    {ROW(derived.band_square), .unit = OF_JOINTS, .count = BANDS * BAND_NUMBERS, .when = WITH_BANDS},
-    {ROW(derived.load_arm), .unit = OF_MATRIX, .when = WITH_BANDS},
-    {ROWS(derived.links.axis, derived.links.tip), .unit = OF_JOINTS, .count = 3, .when = WITH_LINKS},
+    {ROW(derived.band_square), .unit = OF_JOINTS, .count = BANDS * BAND_NUMBERS, .when = MODEL_DETECTS_BY_BANDS},
+    {ROW(derived.load_arm), .unit = OF_MATRIX, .when = MODEL_DETECTS_BY_BANDS},
+    {ROWS(derived.links.axis, derived.links.tip), .unit = OF_JOINTS, .count = 3, .when = MODEL_HAS_LINKS},
     {ROW(derived.axis_cosine), .unit = OF_JOINTS, .count = MODEL_MAX_JOINTS, .when = WITH_EXTENSIONS},
     {ROWS(memory.remembers, memory.sections), .unit = OF_SLOTS, .when = WITH_MEMORY},
     {ROWS(memory.element[0].share, memory.element[0].soft), .unit = OF_SLOTS, .when = WITH_MEMORY},
@@ -134,25 +134,19 @@ static const finger_row other_rows[] = {
     {ROWS(scratch.force, scratch.slack), .unit = OF_TENDONS},
     {ROWS(scratch.angle, scratch.residual_variance), .unit = OF_JOINTS},
     {ROWS(scratch.edge, scratch.force_between), .unit = OF_MATRIX},
-    {ROWS(scratch.slip_torque, scratch.young), .unit = OF_JOINTS, .when = WITH_BANDS},
-    {ROWS(scratch.edge_limit, scratch.pulley_limit), .unit = OF_SLOTS, .when = WITH_BANDS},
-    {ROW(scratch.inverse_routing), .unit = OF_MATRIX, .when = WITH_SENSOR_FAULT},
-    {ROWS(scratch.leverage, scratch.row_in_use), .unit = OF_TENDONS, .when = WITH_SENSOR_FAULT},
-    {ROW(scratch.angle_shift), .unit = OF_JOINTS, .when = WITH_SENSOR_FAULT},
+    {ROWS(scratch.slip_torque, scratch.young), .unit = OF_JOINTS, .when = MODEL_DETECTS_BY_BANDS},
+    {ROWS(scratch.edge_limit, scratch.pulley_limit), .unit = OF_SLOTS, .when = MODEL_DETECTS_BY_BANDS},
+    {ROW(scratch.inverse_routing), .unit = OF_MATRIX, .when = MODEL_HAS_SENSOR_FAULT},
+    {ROWS(scratch.leverage, scratch.row_in_use), .unit = OF_TENDONS, .when = MODEL_HAS_SENSOR_FAULT},
+    {ROW(scratch.angle_shift), .unit = OF_JOINTS, .when = MODEL_HAS_SENSOR_FAULT},
     {ROW(scratch.velocity), .unit = OF_SLOTS},
 };
 
-static int is_present(const model_shape* shape, row_condition when) {
-  switch (when) {
-    case WITH_BANDS: return (shape->options & MODEL_DETECTS_BY_BANDS) != 0;
-    case WITH_SENSOR_FAULT: return (shape->options & MODEL_HAS_SENSOR_FAULT) != 0;
-    case WITH_LINKS: return (shape->options & MODEL_HAS_LINKS) != 0;
-    case WITH_EXTENSIONS: return shape->extension_count > 0;
-    case WITH_MEMORY: return shape->elements > 0;
-    case WITH_TWO_ELEMENTS: return shape->elements > 1;
-    case WITH_CORDS: return shape->elements > 0 && shape->stretches;
-    default: return 1;
-  }
+static int is_present(const model_shape* shape, uint32_t when) {
+  const uint32_t has = shape->options | (shape->extension_count > 0 ? WITH_EXTENSIONS : 0) |
+                       (shape->elements > 0 ? WITH_MEMORY : 0) | (shape->elements > 1 ? WITH_TWO_ELEMENTS : 0) |
+                       (shape->elements > 0 && shape->stretches ? WITH_CORDS : 0);
+  return (has & when) == when;
 }
 
 static size_t edge_records(const model_shape* shape) {
@@ -205,7 +199,7 @@ static void lay_out_prepared(tendonfmu_finger* f, cursor* c) {
   d->edge_angle_row = take(c, n * sizeof(size_t));
   d->edge_record = take(c, matrix * sizeof(uint32_t));
   d->can_hold = take(c, matrix / 4);
-  d->least_link = take(c, is_present(&f->shape, WITH_LINKS) ? n * sizeof(int) : 0);
+  d->least_link = take(c, is_present(&f->shape, MODEL_HAS_LINKS) ? n * sizeof(int) : 0);
   f->prepared_bytes = c->used - begin;
 }
 
@@ -235,7 +229,7 @@ static size_t lay_out(const model_shape* shape, tendonfmu_finger* f, unsigned ch
   lay_out_prepared(f, &c);
   place_rows(f, &c, other_rows, sizeof other_rows / sizeof other_rows[0]);
   f->extensions.signal = take(&c, f->shape.extension_count * sizeof(extension_row));
-  f->scratch.shares = take(&c, is_present(shape, WITH_BANDS) ? sizeof(band_shares) : 0);
+  f->scratch.shares = take(&c, is_present(shape, MODEL_DETECTS_BY_BANDS) ? sizeof(band_shares) : 0);
   f->scratch.view = take(&c, f->slots / 4 * sizeof(slot_view));
   return c.used;
 }

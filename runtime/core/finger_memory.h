@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "contact_bands.h"
+#include "effect_facts.h"
 #include "friction_law.h"
 #include "link_geometry.h"
 #include "model_image.h"
@@ -57,7 +58,6 @@ typedef struct friction_element {
 
 /* Places whose friction has a memory. */
 typedef struct friction_memory {
-  size_t elements;   /* side by side, 0: there is no memory */
   double compliance; /* of the cords, 1/k_c, m/N; 0: rigid */
   double stretch;    /* the same in the present step: 0 in the first */
   int relaxes;       /* some place has a relaxation time */
@@ -174,16 +174,12 @@ typedef enum row_unit {
   OF_EXTENSIONS /* what they remember */
 } row_unit;
 
-/* Of what finger it is a part; NULL in any other. */
+/* Of what finger it is a part, NULL in any other: of one with an option (MODEL_HAS_LINKS, …), or with these. */
 typedef enum row_condition {
-  ALWAYS,
-  WITH_BANDS,
-  WITH_SENSOR_FAULT,
-  WITH_LINKS,
-  WITH_EXTENSIONS,
-  WITH_MEMORY, /* of friction */
-  WITH_TWO_ELEMENTS,
-  WITH_CORDS /* that stretch */
+  WITH_EXTENSIONS = MODEL_OPTION_BITS + 1,
+  WITH_MEMORY = 2 * WITH_EXTENSIONS, /* of friction */
+  WITH_TWO_ELEMENTS = 2 * WITH_MEMORY,
+  WITH_CORDS = 2 * WITH_TWO_ELEMENTS /* that stretch */
 } row_condition;
 
 /* What a number in a saved state may be at most or, with MINUS, at least. */
@@ -204,10 +200,10 @@ typedef enum state_bound {
 /* Rows of numbers, each with a pointer in struct tendonfmu_finger: all of its memory follows from such. */
 typedef struct finger_row {
   uint16_t place;         /* offset of the first pointer */
+  uint16_t when;          /* an option, row_condition, or 0: always */
   unsigned char pointers; /* how many side by side */
   unsigned char count;    /* of the unit; 0: 1 */
   unsigned char unit;     /* row_unit */
-  unsigned char when;     /* row_condition */
   /* what may stand in a saved state */
   unsigned char whole;            /* whole numbers only */
   unsigned char spare;            /* lanes that stand for nothing are tracked along; else they hold 0 */
@@ -312,7 +308,12 @@ static inline double sum_of_lanes(const double of[4]) {
 
 /* Whether the description has any of these parts (MODEL_HAS_LINKS, …). */
 static inline int has_option(const tendonfmu_finger* finger, uint32_t options) {
-  return (finger->shape.options & options) != 0;
+  return (finger->shape.options & options & (TENDONFMU_OPTIONS)) != 0;
+}
+
+/* How many elements of friction with a memory stand side by side at most; 0: there is none. */
+static inline size_t elements_of(const tendonfmu_finger* finger) {
+  return PRESLIDING_IS_LINKED ? finger->shape.elements : 0;
 }
 
 /* What a joint's bands remember. */

@@ -75,13 +75,13 @@ static void find_elements(tendonfmu_finger* f, size_t slot) {
       found = 0;
       sum = 0.0;
     }
-    if (here && here == rank && found < f->memory.elements) {
+    if (here && here == rank && found < elements_of(f)) {
       set_element(f, found++, slot, row->place, row->parameters);
       sum += row->parameters[SHARE];
     }
   }
   f->memory.remembers[slot] = found ? 1.0 : 0.0;
-  for (size_t e = 0; e < f->memory.elements; ++e) {
+  for (size_t e = 0; e < elements_of(f); ++e) {
     const friction_element* to = &f->memory.element[e];
     to->share[slot] = e < found ? to->share[slot] / sum : 0.0;
     to->stiffness[slot] = e < found ? to->stiffness[slot] : 0.0;
@@ -122,7 +122,7 @@ static double decayed_gain(double time, double step) {
 /* what a and g make of every place in a step of this length, s; most places share their relaxation time */
 static void find_decay(tendonfmu_finger* f, double step) {
   double time = -1.0, kept = 1.0, gain = 1.0;
-  for (size_t e = 0; e < f->memory.elements; ++e) {
+  for (size_t e = 0; e < elements_of(f); ++e) {
     const friction_element* element = &f->memory.element[e];
     for (size_t slot = 0; slot < f->slots; ++slot) {
       if (element->relaxation_time[slot] != time) {
@@ -139,9 +139,8 @@ static void find_decay(tendonfmu_finger* f, double step) {
 }
 
 void find_memory(tendonfmu_finger* f) {
-  f->memory.elements = f->shape.elements;
   f->memory.relaxes = 0;
-  if (!f->memory.elements) {
+  if (!elements_of(f)) {
     return;
   }
   f->memory.compliance = cord_compliance(f);

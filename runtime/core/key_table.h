@@ -28,6 +28,11 @@ enum {
   MODEL_OPTION_BITS = 1023
 };
 
+/* Those whose code is linked: all, unless a program's build says which its fingers have. */
+#ifndef TENDONFMU_OPTIONS
+#define TENDONFMU_OPTIONS MODEL_OPTION_BITS
+#endif
+
 /* The parameters come in items, in this order: joints, tendons, finger, extensions. */
 typedef enum model_item_kind {
   ITEM_COVER, /* joints[j].cover */
@@ -85,7 +90,6 @@ typedef struct key_row {
   unsigned char tunable, has_default;
   unsigned char count; /* key_count */
   uint16_t option; /* the bit of the model image without which it is not there; 0: always there */
-  double default_value;
 } key_row;
 
 /* The row of number `offset` of an item; not of ITEM_EXTENSION. */

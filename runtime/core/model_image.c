@@ -206,6 +206,9 @@ static int read_counts(const void* image, size_t image_size, model_shape* shape,
   if (shape->options & ~(uint32_t)MODEL_OPTION_BITS) {
     return refuse_value(message, "model image: option bits", shape->options, "a sum of known ones");
   }
+  if (shape->options & ~(uint32_t)(TENDONFMU_OPTIONS)) {
+    return refuse_value(message, "model image: option bits", shape->options, "none beyond TENDONFMU_OPTIONS");
+  }
   if ((shape->options & (MODEL_DETECTS_BY_BANDS | MODEL_WATCHES_MOTORS)) == MODEL_WATCHES_MOTORS) {
     return refuse_value(message, "model image: option bits", shape->options, "ones that go together");
   }
@@ -324,6 +327,10 @@ static int check_extension(const unsigned char* table, uint32_t i, model_shape* 
   const uint32_t place[3] = {load_u32(row + 4), load_u32(row + 8), load_u32(row + 12)};
   if (!effect) {
     return refuse_value(message, "model image: effect number", load_u32(row), "one that this version knows");
+  }
+  if (!effect->action) {
+    return message_write(message, "model image with %s, which is not linked: expected bit %zu in TENDONFMU_EFFECTS",
+                         effect->name, (size_t)effect->id);
   }
   if (!place_is_sound(effect, shape, place)) {
     return refuse_value(message, "model image: joint of an extension", place[0], "a place where such an effect can be");

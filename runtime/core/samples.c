@@ -49,15 +49,14 @@ static int check_time(const tendonfmu_finger* f, double time, message_line messa
   return initialised ? message_add(message, ", not before the sample already taken at %g s", before) : -1;
 }
 
-/* NaN is out of range; four at once, with the spare lanes behind */
+/* NaN is out of range */
 static int is_in_range(const input_row* row) {
-  int inside = 1;
-  for (size_t i = 0; i < row->count; i += 4) {
-    for (size_t lane = i; lane < i + 4; ++lane) {
-      inside &= fabs(row->to[lane]) <= LARGEST_INPUT;
-    }
+  const double* values = row->to;
+  int outside = 0;
+  for (size_t i = 0; i < row->count; ++i) {
+    outside |= !(fabs(values[i]) <= LARGEST_INPUT);
   }
-  return inside;
+  return !outside;
 }
 
 static int refuse_input(const input_row* row, double time, message_line message) {

@@ -238,7 +238,7 @@ int take_sample(tendonfmu_finger* f, double time) {
     watch_sensors(f, time, first ? 0.0 : step);
   }
   const double velocity_gain = find_kinematics(f, time, step);
-  if (f->memory.elements) {
+  if (elements_of(f)) {
     turn_places(f, step);
   }
   if (f->shape.extension_count) {

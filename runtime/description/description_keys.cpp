@@ -2,8 +2,6 @@
 /* clang-format off */
 #include "description_keys.h"
 
-#include "core_inside.h"
-
 namespace tendonfmu {
 
 const std::vector<key_fact>& key_facts() {
@@ -73,6 +71,25 @@ const std::vector<key_fact>& key_facts() {
 const std::vector<std::string>& law_keys() {
   static const std::vector<std::string> keys = {"static", "coulomb", "stribeck_velocity", "viscous"};
   return keys;
+}
+
+double default_of(model_item_kind kind) {
+  switch (kind) {
+    case ITEM_TENDON_THRESHOLD: return 0.0005;
+    case ITEM_JOINT_THRESHOLD: return 0.01;
+    case ITEM_FILTER_CUTOFF: return 20.0;
+    case ITEM_DRIFT_VARIANCE: return 1e-06;
+    case ITEM_NOISE_STD: return 0.01;
+    case ITEM_FORGET_RATE: return 5.0;
+    case ITEM_FAULT_HOLD_TIME: return 0.05;
+    case ITEM_FAULT_FORCE_RESOLUTION: return 0.01;
+    case ITEM_FAULT_POSITION_RESOLUTION: return 2e-06;
+    case ITEM_FAULT_JUMP_MARGIN: return 1.0;
+    case ITEM_FAULT_SPRING_MARGIN: return 1.0;
+    case ITEM_FAULT_LONGEST_STAND: return 1000000000.0;
+    case ITEM_FAULT_RECOVERY_TIME: return 0.5;
+    default: return 0.0;
+  }
 }
 
 }  // namespace tendonfmu

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "core_inside.h"
+
 namespace tendonfmu {
 
 /* number: read by its path in the core; per_joint: a list of them; vector: three. */
@@ -41,5 +43,8 @@ const std::vector<key_fact>& key_facts();
 
 /* The numbers of one side of a friction law. */
 const std::vector<std::string>& law_keys();
+
+/* What a number of the core's table that has a default is where it is left out. */
+double default_of(model_item_kind kind);
 
 }  // namespace tendonfmu

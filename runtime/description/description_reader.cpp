@@ -1,10 +1,10 @@
 /* The C interface, tendonfmu_description.h: parse, read which things there are, read their numbers, check, write. */
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <exception>
 #include <memory>
 #include <new>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -416,14 +416,12 @@ finger_shape read_shape(const json_node& document) {
 /* --- their numbers --------------------------------------------------------------------------------------------------
  */
 
-/* Value of a number that is left out, where it may be. */
-std::optional<double> default_value(const model_item& item, std::uint32_t offset) {
-  if (item.kind != ITEM_EXTENSION) {
-    const key_row* row = key_row_of(item.kind, offset);
-    return row->has_default ? std::optional<double>(row->default_value) : std::nullopt;
+/* Value of a number that is left out; NaN where it may not be. */
+double default_value(const model_item& item, std::uint32_t offset) {
+  if (item.kind == ITEM_EXTENSION) {
+    return effect_expectation_of(item.effect, offset)->missing_value;
   }
-  const effect_parameter& number = item.effect->parameters[offset];
-  return number.required ? std::nullopt : std::optional<double>(number.missing_value);
+  return key_row_of(item.kind, offset)->has_default ? default_of(item.kind) : NAN;
 }
 
 double read_value(const json_node& document, const model_item& item, std::uint32_t index) {
@@ -433,9 +431,9 @@ double read_value(const json_node& document, const model_item& item, std::uint32
   if (node.value().is_number()) {
     return node.value().get<double>();
   }
-  const std::optional<double> missing = default_value(item, index - item.first);
-  if (node.absent() && missing) {
-    return *missing;
+  const double missing = default_value(item, index - item.first);
+  if (node.absent() && !std::isnan(missing)) {
+    return missing;
   }
   char range[120] = "";
   parameter_say_range(&item, index, message_line{range, sizeof range});

@@ -69,7 +69,7 @@ std::vector<unsigned char> free_finger::save() const {
 }
 
 bool remembers_numbers(const tendonfmu_finger* finger) {
-  return finger->extensions.signals + finger->extensions.frictions + finger->memory.elements > 0;
+  return finger->extensions.signals + finger->extensions.frictions + elements_of(finger) > 0;
 }
 
 /* --- recordings --------------------------------------------------------------------------------------------------- */

@@ -61,9 +61,9 @@ sample_rows::sample_rows(const unknown_list& unknowns, const tendonfmu_finger* f
       jumped_(2 * joints_),
       acting_(2 * joints_),
       by_force_(2 * joints_),
-      by_limit_(finger->memory.elements * places_) {
+      by_limit_(elements_of(finger) * places_) {
   const bool exact = wanted == derivatives::exact;
-  if (exact && finger->memory.elements > 0) {
+  if (exact && elements_of(finger) > 0) {
     throw std::invalid_argument("friction with a memory (presliding): its derivative by the numbers is not known here");
   }
   for (std::uint32_t p = 0; exact && p < finger->shape.parameter_count; ++p) {
@@ -84,7 +84,7 @@ bool sample_rows::sees_event() const {
 
 /* whether the friction of a slot remembers (docs/reference/semantics/presliding.md) */
 bool sample_rows::remembers(std::size_t slot) const {
-  return finger_->memory.elements > 0 && finger_->memory.remembers[slot] != 0.0;
+  return elements_of(finger_) > 0 && finger_->memory.remembers[slot] != 0.0;
 }
 
 /* what friction rows make of a slot */
@@ -160,7 +160,7 @@ double sample_rows::slope_by_limit(const friction_place& p, double limit) {
   const friction_memory& memory = finger_->memory;
   const bool tendon = p.place < 2 * joints_ * finger_->tendons;
   double slope = 0.0;
-  for (std::size_t e = 0; e < memory.elements; ++e) {
+  for (std::size_t e = 0; e < elements_of(finger_); ++e) {
     const friction_element& element = memory.element[e];
     const std::size_t row = 2 * e + (tendon ? p.place % 2 : 0); /* edges, pulleys */
     const double held = finger_->remembered.element[row * finger_->slots + p.slot];
@@ -240,7 +240,7 @@ void sample_rows::follow_forces(std::size_t tendon) {
     double lost = acting_[k] * (pulley ? s.pulley : s.edge)[slot];
     if (remembers(slot)) {
       lost = 0.0;
-      for (std::size_t e = 0; e < finger_->memory.elements; ++e) {
+      for (std::size_t e = 0; e < elements_of(finger_); ++e) {
         lost += finger_->remembered.element[(2 * e + pulley) * slots + slot];
       }
     }

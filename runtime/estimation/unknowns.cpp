@@ -77,14 +77,14 @@ std::string path_of(const tendonfmu_finger* finger, std::uint32_t parameter) {
 
 /* expected of a number of an extension where nothing else says it */
 double scale_of(const model_item& item, std::uint32_t parameter) {
-  const effect_parameter& number = item.effect->parameters[parameter - item.first];
+  const effect_expectation& number = *effect_expectation_of(item.effect, parameter - item.first);
   return is_everywhere(item.place) && number.scale_everywhere > 0.0 ? number.scale_everywhere : number.scale;
 }
 
 /* a number of an extension that is a property of the mechanism, not 0 where nobody says it */
 bool left_out(const finger_structure& s, std::uint32_t parameter) {
   const model_item item = parameter_item(&s.finger->shape, parameter);
-  const double missing = item.effect->parameters[parameter - item.first].missing_value;
+  const double missing = effect_expectation_of(item.effect, parameter - item.first)->missing_value;
   return missing != 0.0 && s.finger->start[parameter] == missing;
 }
 

@@ -74,7 +74,6 @@ struct Effect {
     seen.tendons = tendons;
     seen.lanes = lanes;
     seen.first = sample.first;
-    seen.source = 3;
     seen.time = sample.time;
     seen.step = sample.step;
     seen.angle = sample.angle.data();
@@ -215,11 +214,12 @@ TEST(Table, HasDifferentNamesAndNumbers) {
     EXPECT_TRUE(ids.insert(effect->id).second) << effect->name;
     EXPECT_EQ(effect_by_id(effect->id), effect);
     EXPECT_LE(effect->parameter_count, std::uint32_t{EFFECT_MAX_PARAMETERS});
+    EXPECT_LT(effect->id, 64) << effect->name << ": a bit of TENDONFMU_EFFECTS";
     const effect_action& acts = *effect->action;
     EXPECT_EQ(acts.state_count || acts.memory_count, acts.advance || acts.kind == EFFECT_SIGNAL) << effect->name;
     for (std::uint32_t p = 0; p < effect->parameter_count; ++p) {
       const effect_parameter& number = effect->parameters[p];
-      EXPECT_GT(number.scale, 0.0) << effect->name << "." << number.name;
+      EXPECT_GT(effect_expectation_of(effect, p)->scale, 0.0) << effect->name << "." << number.name;
       EXPECT_LT(number.minimum, number.maximum) << effect->name << "." << number.name;
       EXPECT_TRUE(number.unit && *number.unit) << effect->name << "." << number.name;
     }

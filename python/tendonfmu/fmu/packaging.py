@@ -8,6 +8,7 @@ from __future__ import annotations
 import importlib.util
 import io
 import re
+import struct
 import unicodedata
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
@@ -295,9 +296,13 @@ def _variables(model: ElementTree.Element) -> Iterator[tuple[str | None, int]]:
 _BYTES_A_LINE = 20
 
 _TEXT = """\
-/* The finger "{title}" with {joints} joints and {tendons} tendons, for tendonfmu_place(): the model image, and bytes of
- * memory that are enough on every machine. Made by `tendonfmu build --c-array`, version {version}. */
+/* The finger "{title}" with {joints} joints and {tendons} tendons, for tendonfmu_place(): the model image, bytes of
+ * memory that are enough on every machine, TENDONFMU_EFFECTS and TENDONFMU_OPTIONS of a program for it alone. Made by
+ * `tendonfmu build --c-array`, version {version}. */
 #include <stddef.h>
+
+#define {name}_effects 0x{effects:x} /* {effect_names} */
+#define {name}_options 0x{options:x}
 
 enum {{ {name}_memory_size = {memory} }};
 
@@ -319,11 +324,21 @@ def write_c_array(finger: Finger, output: Path) -> Path:
         tendons=len(finger.data["tendons"]),
         version=native.version(),
         name=model_identifier(finger.name),
+        effects=_effect_bits(image),
+        effect_names=", ".join(sorted({row["effect"] for row in finger.data.get("extensions", [])})) or "none",
+        options=struct.unpack_from("<I", image, 40)[0],
         memory=native.memory_size(image),
         size=len(image),
         rows="\n".join(f"    {''.join(f'{byte},' for byte in line)}" for line in lines),
     )
     return write_bytes(output, text.encode("ascii"))
+
+
+def _effect_bits(image: bytes) -> int:
+    """Return a bit for each effect of a model image, by its number there (runtime/core/model_image.h)."""
+    words, count = struct.unpack_from("<2I", image, 44)
+    numbers = {struct.unpack_from("<I", image, 56 + 4 * words + 16 * row)[0] for row in range(count)}
+    return sum(1 << number for number in numbers)
 
 
 def c_array_report(source: Path, finger: Finger, output: Path) -> dict[str, Any]:

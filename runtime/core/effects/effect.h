@@ -14,6 +14,12 @@
 
 enum { EFFECT_MAX_PARAMETERS = 4 };
 
+/* The effects that are linked, a bit each by its id: all, unless a program's build says which its fingers have. */
+#ifndef TENDONFMU_EFFECTS
+#define TENDONFMU_EFFECTS UINT64_MAX
+#endif
+#define EFFECT_IS_LINKED(id) ((uint64_t)(TENDONFMU_EFFECTS) >> id & 1)
+
 #define EFFECT_NOWHERE 0xffffffffu
 
 typedef enum place_need { PLACE_REFUSED, PLACE_OPTIONAL, PLACE_REQUIRED } place_need;
@@ -32,11 +38,15 @@ typedef struct effect_parameter {
   const char* unit_at_joint;   /* where it differs there; NULL: the same */
   const char* unit_everywhere; /* of a row without a place, where it differs there; NULL: the same */
   double minimum, maximum;
-  unsigned char above_minimum, required; /* 1: the minimum itself is not allowed; it must not be left out */
-  double missing_value;                  /* taken where the description leaves the key out */
-  double scale;                          /* expected magnitude where nothing is known, for the estimation */
-  double scale_everywhere;               /* of a row without a place; 0: the same */
+  unsigned char above_minimum; /* 1: the minimum itself is not allowed */
 } effect_parameter;
+
+/* What else is known of it, for those who read descriptions and estimate: no part of a program that does neither. */
+typedef struct effect_expectation {
+  double missing_value;    /* taken where the description leaves the key out; NaN: it must not */
+  double scale;            /* expected magnitude where nothing is known */
+  double scale_everywhere; /* of a row without a place; 0: the same */
+} effect_expectation;
 
 /* Where a row of the description's extensions acts; 0-based, EFFECT_NOWHERE where the key is absent. */
 typedef struct effect_place {
@@ -51,7 +61,6 @@ static inline int is_everywhere(effect_place place) {
 typedef struct effect_sample {
   size_t joints, tendons, lanes;
   int first;                                /* 1: the first sample */
-  int source;                               /* kinematics source 1, 2, 3 */
   double time, step;                        /* s; step is meaningless at the first sample */
   const double* angle;                      /* [n] rad */
   const double* velocity;                   /* [n] rad/s */
@@ -156,19 +165,23 @@ struct effect_action {
 /* A row of the table of effects. */
 typedef struct effect_type {
   const char* name;            /* as in a description */
-  uint32_t id;                 /* in the model image; never reused */
+  unsigned char id;            /* in the model image, below 64; never reused */
   unsigned char joint, tendon; /* place_need */
   unsigned char rule;          /* place_rule */
   unsigned char level;         /* 1: it may stand at a level */
   unsigned char most;          /* rows of the same place; 0: any number */
   unsigned char one_of;        /* of its first numbers exactly one is above 0; 0: no such rule */
+  /* 0 and NULL where it is not linked */
   unsigned char parameter_count;
   const effect_parameter* parameters;
   const effect_action* action;
 } effect_type;
 
-/* Row by id; NULL when there is none. */
+/* Row by id, whether it is linked or not; NULL when there is none. */
 const effect_type* effect_by_id(uint32_t id);
 
 /* Row by position 0.., NULL past the end. */
 const effect_type* effect_at(size_t position);
+
+/* Of number `offset` of an effect. */
+const effect_expectation* effect_expectation_of(const effect_type* effect, uint32_t offset);

@@ -25,3 +25,5 @@ extern const effect_action time_delay_action;
 extern const effect_action stribeck_action;
 
 enum { EFFECT_COUNT = 19 };
+
+enum { PRESLIDING_IS_LINKED = EFFECT_IS_LINKED(26) };

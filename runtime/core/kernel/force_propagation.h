@@ -85,7 +85,7 @@ HOT_INLINE quad gripped(const tendonfmu_finger* f, size_t slot, quad friction) {
  * |F| itself where it has a memory; and what the friction rows make of it */
 HOT_INLINE quad acting_friction(const tendonfmu_finger* f, const motion* m, quad magnitude) {
   const quad by_motion = quad_keep(m->moving, quad_with_sign(magnitude, m->velocity));
-  const quad acting = f->memory.elements ? quad_select(slides_at(f, m->slot), magnitude, by_motion) : by_motion;
+  const quad acting = elements_of(f) ? quad_select(slides_at(f, m->slot), magnitude, by_motion) : by_motion;
   return gripped(f, m->slot, acting);
 }
 
@@ -180,7 +180,7 @@ HOT_INLINE quad acting_force(quad force, tendon_kinds kinds) {
 HOT_INLINE quad loss_at(tendonfmu_finger* f, size_t slot, size_t row, const double* friction, quad acting,
                         quad before) {
   const quad value = quad_load(friction + slot), loss = acting * value;
-  if (!f->memory.elements) {
+  if (!elements_of(f)) {
     return loss;
   }
   const quad_mask slides = slides_at(f, slot);
@@ -239,7 +239,7 @@ HOT_INLINE quad own_friction(tendonfmu_finger* f, size_t j, quad sum) {
   const finger_scratch* s = &f->scratch;
   const quad joint = quad_load(s->joint_friction + j), load = quad_load(s->load_friction + j);
   const quad both = joint + load * sum;
-  if (!f->memory.elements) {
+  if (!elements_of(f)) {
     return both;
   }
   const quad_mask slides = slides_at(f, f->joints * f->tendon_lanes + j);
@@ -270,7 +270,7 @@ HOT_INLINE void friction_limits(tendonfmu_finger* f) {
   }
   for (size_t j = 0; j < f->joint_lanes; j += QUAD_LANES) {
     const quad load = quad_load(s->pulley_limit + joint_row + j) * quad_load(s->load + j);
-    const quad own = f->memory.elements ? quad_load(s->own_limit + j) : quad_set(0.0);
+    const quad own = elements_of(f) ? quad_load(s->own_limit + j) : quad_set(0.0);
     quad_store(s->limit + j, quad_sum_rows(total + j) + (quad_load(s->edge_limit + joint_row + j) + load) + own);
   }
 }
@@ -361,8 +361,10 @@ static void one_minus_exponentials(const double* x, double* values, size_t count
   }
 }
 
-#define STEP_KERNEL(name)                                                                                \
-  {                                                                                                      \
-    name, one_minus_exponentials, multiply, tendon_velocities, watch_tendons, follow_bands, weigh_bands, \
-        find_friction, remember_slots                                                                    \
+#define LINKED_WITH(option, function) ((TENDONFMU_OPTIONS) & (option) ? (function) : NULL)
+#define STEP_KERNEL(name)                                                                                          \
+  {                                                                                                                \
+    name, one_minus_exponentials, multiply, tendon_velocities, LINKED_WITH(MODEL_HAS_SENSOR_FAULT, watch_tendons), \
+        LINKED_WITH(MODEL_DETECTS_BY_BANDS, follow_bands), LINKED_WITH(MODEL_DETECTS_BY_BANDS, weigh_bands),       \
+        find_friction, remember_slots                                                                              \
   }

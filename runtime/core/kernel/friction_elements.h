@@ -11,7 +11,7 @@ enum { EDGES, PULLEYS }; /* rows of slots of what is remembered; a joint's own f
 
 /* lanes whose friction has a memory: they slide at all times */
 HOT_INLINE quad_mask slides_at(const tendonfmu_finger* f, size_t slot) {
-  const quad remembers = f->memory.elements ? quad_load(f->memory.remembers + slot) : quad_set(0.0);
+  const quad remembers = elements_of(f) ? quad_load(f->memory.remembers + slot) : quad_set(0.0);
   return quad_greater(remembers, quad_set(0.5));
 }
 
@@ -100,18 +100,18 @@ HOT_INLINE quad step_places(tendonfmu_finger* f, const places* p) {
   const quad zero = quad_set(0.0);
   quad sum = zero, by_turning = zero, by_limit = zero;
   trial t[MODEL_MAX_ELEMENTS];
-  for (size_t e = 0; e < f->memory.elements; ++e) {
+  for (size_t e = 0; e < elements_of(f); ++e) {
     t[e] = begin_trial(f, p, e);
   }
-  if (p->stretches && f->memory.elements == 2) {
+  if (p->stretches && elements_of(f) == 2) {
     solve_pair(t, p);
   } else {
-    for (size_t e = 0; e < f->memory.elements; ++e) {
+    for (size_t e = 0; e < elements_of(f); ++e) {
       t[e].held = trial_force(&t[e], p, zero);
       end_trial(&t[e]);
     }
   }
-  for (size_t e = 0; e < f->memory.elements; ++e) {
+  for (size_t e = 0; e < elements_of(f); ++e) {
     const quad force = clip_to(t[e].held, t[e].limit);
     quad_store(s->element + e * 2 * f->slots + p->at, force);
     sum += force;
@@ -121,7 +121,7 @@ HOT_INLINE quad step_places(tendonfmu_finger* f, const places* p) {
   if (p->stretches) {
     turned -= sum * p->compliance;
   }
-  for (size_t e = 0; e < f->memory.elements; ++e) {
+  for (size_t e = 0; e < elements_of(f); ++e) {
     const friction_element* element = &f->memory.element[e];
     const quad slips = quad_with_sign(quad_set(1.0), t[e].held);
     const quad own = quad_select(t[e].free, quad_load(element->soft + p->slot) * turned, slips);
@@ -141,7 +141,7 @@ HOT_INLINE quad step_places(tendonfmu_finger* f, const places* p) {
 HOT_INLINE quad step_rigid(tendonfmu_finger* f, size_t slot, size_t row, quad limit) {
   const places p = {
       .slot = slot, .at = row * f->slots + slot, .limit = limit, .turned = quad_load(f->scratch.travelled + slot)};
-  return f->memory.elements > 1 ? step_places(f, &p) : step_alone(f, &p);
+  return elements_of(f) > 1 ? step_places(f, &p) : step_alone(f, &p);
 }
 
 /* What some tendons lose at their edges or pulleys at a slot, with |F| of the law and the force before them. */
@@ -159,7 +159,7 @@ HOT_INLINE quad loss_of_memory(tendonfmu_finger* f, size_t slot, size_t row, qua
 
 /* At places that have no memory. */
 HOT_INLINE void remember_nothing(const tendonfmu_finger* f, size_t at) {
-  for (size_t e = 0; e < f->memory.elements; ++e) {
+  for (size_t e = 0; e < elements_of(f); ++e) {
     quad_store(f->scratch.element + e * 2 * f->slots + at, quad_set(0.0));
   }
   quad_store(f->scratch.by_turning + at, quad_set(0.0));
