@@ -13,12 +13,13 @@ from fit_cases import small_finger
 from tendonfmu.diagnosis import extension_diagnosis as whole
 from tendonfmu.diagnosis import search as search_module
 from tendonfmu.diagnosis.answer import not_taken
+from tendonfmu.diagnosis.candidate_columns import HERE, SOMEWHERE
 from tendonfmu.diagnosis.effects import Place, Term, Where, by_name
 from tendonfmu.diagnosis.effects.mechanism import Sizes
 from tendonfmu.diagnosis.effects.words import presliding
 from tendonfmu.diagnosis.extension_fit import Row, memory_terms
 from tendonfmu.diagnosis.result import Cause
-from tendonfmu.diagnosis.search import FORM, ExtensionSearch, _of_start
+from tendonfmu.diagnosis.search import FORM, ExtensionSearch, Trial, _of_start
 from tendonfmu.diagnosis.selection import Judged, names_needed
 from tendonfmu.statistics import Interval
 
@@ -100,6 +101,35 @@ def test_a_refused_cause_has_the_gain_of_its_fit(monkeypatch: pytest.MonkeyPatch
         monkeypatch.setattr(search, "_best_fitted", lambda *_, trial=trial: trial)
         refused = search._try_next(set())
         assert refused is not None and not refused[1] and refused[0].gain.value == pytest.approx(gain)
+
+
+@pytest.mark.parametrize(
+    ("left", "taken"),
+    [
+        ({"single": 0.95}, "single"),
+        ({"single": 0.99}, "shared"),  # too little for a finer place
+        ({"single": 1.05}, "shared"),
+        ({"simple": 1.01}, "simple"),  # as good, with fewer numbers
+        ({"simple": 1.2}, "shared"),
+    ],
+)
+def test_the_fits_choose_place_and_effect(left: dict[str, float], taken: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A shared effect of two numbers at a joint, beside one tendon's alone and another effect of one number."""
+    two, one = np.zeros(2), np.zeros(1)
+    single = Judged(Where("preload_friction", 1, 2), low=two, level=HERE)
+    simple = Judged(Where("stribeck", 1), low=one, level=SOMEWHERE)
+    shared = Judged(Where("preload_friction", 1), low=two, level=SOMEWHERE, alike=(simple,))
+    known = {"single": single, "simple": simple, "shared": shared}
+    wheres = {cause.where: name for name, cause in known.items()}
+    selection = cast("Any", SimpleNamespace(refined=lambda name: simple if name == "stribeck" else shared))
+    selection.near = lambda cause: [single] if cause is shared and "single" in left else []
+    search, before = object.__new__(ExtensionSearch), np.full(20, 0.05)
+    monkeypatch.setattr(search, "_named", lambda cause, _: replace(cause, p_value=1e-9))
+    errors = {"single": 2.0, "simple": 2.0, "shared": 1.0} | left
+    monkeypatch.setattr(
+        search, "_tried", lambda cause: Trial(cause, cast("Any", object()), errors[wheres[cause.where]] * before)
+    )
+    assert wheres[search._best_fitted(selection, shared).cause.where] == taken
 
 
 def test_the_last_check_compares_with_all_that_the_memory_explains(monkeypatch: pytest.MonkeyPatch) -> None:

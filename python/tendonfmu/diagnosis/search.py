@@ -11,7 +11,8 @@ certain. The rules by which a round chooses a cause, in their order:
    mislead. A correction of the torque may replace only another one: it resembles most effects (`_to_fit`).
 5. Of fits that are alike, torque that depends on the angles comes first, since friction takes it up; else the one with
    fewest numbers.
-6. The effect is fitted at the nearly best places, too, and the best is taken.
+6. The effect is fitted at the nearly best places, too, and the best is taken; a finer one if it is better by more
+   than what does not count.
 7. A single sensor may be several, if their usual errors explain nearly as much (`beside_calibration`).
 """
 
@@ -42,6 +43,7 @@ from tendonfmu.diagnosis.extension_fit import (
 from tendonfmu.diagnosis.result import ABSORBED, CausePlace, Event, Sensor, with_error
 from tendonfmu.diagnosis.selection import (
     CERTAIN,
+    SAME,
     SIGNIFICANCE,
     CauseSearch,
     Judged,
@@ -280,7 +282,9 @@ class ExtensionSearch(CauseSearch):
         alike += [rival for rival in best.alike if rival.effect not in fitted]
         if chosen.cause.mix is (there := selection.refined(chosen.cause.effect)).mix:
             near = [self._named(near, selection) for near in selection.near(there)[: MOST_FITTED - 1]]
-            chosen = _best_of([chosen, *self._certain_trials([], near)])
+            placed = _best_of([chosen, *self._certain_trials([], near)])
+            counts = placed.cause.level == chosen.cause.level or chosen.error.sum() > (1.0 + SAME) * placed.error.sum()
+            chosen = placed if counts else chosen
         return replace(chosen, cause=replace(chosen.cause, alike=tuple(alike)))
 
     def _certain_trials(self, first: Sequence[Judged], others: Sequence[Judged]) -> list[Trial]:

@@ -273,12 +273,12 @@ class Selection:
         return chosen
 
     def near(self, best: Judged) -> list[Judged]:
-        """Return the same effect at other places of the same level that are nearly as good, the best first."""
+        """Return the same effect at other places, no coarser ones, that are nearly as good, the best first."""
         least = float(best.unseen.sum())
         most = least + NEAR * (float(self.base.sum()) - least)
         near: dict[Where, int] = {}
         for k, (error, candidate, _, _) in enumerate(self._results):
-            same = (candidate.effect, candidate.level) == (best.effect, best.level)
+            same = candidate.effect == best.effect and candidate.level >= best.level
             if same and candidate.where != best.where and error <= most:
                 near.setdefault(candidate.where, k)
         return [self._judged(k) for k in near.values()]
