@@ -343,9 +343,6 @@ def possible(data: Mapping[str, Any], causes: Sequence[Term]) -> list[Term]:
     kept = []
     for cause in causes:
         path = changed_law(cause)
-        alone = not any(row["effect"] == PRESLIDING for row in memory_of(data))
-        if cause.mechanism.name in (RELAXATION, CORDS) and alone:  # they are part of a memory that has presliding
-            continue
         if path is None or any(effect.path == path for effect in effects(data)):
             data = cause.added_to(data)
             kept.append(cause)
