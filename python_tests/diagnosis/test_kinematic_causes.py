@@ -20,9 +20,10 @@ from repetitions import repeated
 from tendonfmu.diagnosis.effects import Where
 from tendonfmu.diagnosis.inputs import read_input
 from tendonfmu.diagnosis.kinematic_causes import KinematicCauses, find_kinematic_causes
-from tendonfmu.diagnosis.result import Cause, Diagnosis, Experiment
-from tendonfmu.diagnosis.tendon_equation import encoder_offsets
+from tendonfmu.diagnosis.result import Cause, Diagnosis, Experiment, Invisible
+from tendonfmu.diagnosis.tendon_equation import Off, encoder_offsets
 from tendonfmu.files import write_table
+from tendonfmu.recordings import Learned
 
 FINGER = encoder_finger(1)  # two joints, four tendons
 SECONDS = 40.0
@@ -117,6 +118,10 @@ def test_the_fewest_offsets_and_zeros() -> None:
     assert both.joints.tolist() == [1] and both.single.tolist() == [True, False, False, False]
 
 
+def _learned(is_known: bool) -> Learned:
+    return Learned("tendons[1].moment_arms[1]", 0.01, 1e-5, 0.01, is_known, 1e-4, 0.5)
+
+
 def test_what_is_named_here_is_not_too_small_there() -> None:
     """The search of the torque looks for some of the same effects."""
     zero, other = Cause(Where("zero", None, 1)), Cause(Where("viscous_change", 1, None))
@@ -124,10 +129,14 @@ def test_what_is_named_here_is_not_too_small_there() -> None:
     tried = Diagnosis(
         **{**fields, "verdict": "adequate", "tested": 3, "too_small": (zero, other), "uncertain": (zero,)}
     )
-    both = KinematicCauses(is_change=False, causes=(zero,)).in_diagnosis(
-        dataclasses.replace(tried, experiment=Experiment("Record more."), extended_data={})
+    arms = [Where("moment_arm", 1, tendon) for tendon in (1, 2, 3)]
+    known = {where: Off(where, _learned(where.tendon != 2), 1e-4) for where in arms[:2]}
+    hidden = tuple(Invisible(where, "", 0.0, "") for where in arms)
+    both = KinematicCauses(is_change=False, known=known, causes=(zero,)).in_diagnosis(
+        dataclasses.replace(tried, experiment=Experiment("Record more."), extended_data={}, invisible=hidden)
     )
     assert (both.causes, both.too_small, both.uncertain) == ((zero,), (other,), ())
+    assert [each.where.tendon for each in both.invisible] == [2, 3], "positions show the first arm, whatever the torque"
 
 
 def test_too_many_columns_are_refused(tmp_path: Path, call: Call, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -137,8 +137,10 @@ class KinematicCauses:
             [cause for cause in found if cause.effect not in named]
             for found in (diagnosis.too_small, diagnosis.uncertain)
         )
+        shown = {where for where, off in self.known.items() if where.effect == ARM and off.number.is_known}
         return replace(
             diagnosis,
+            invisible=tuple(each for each in diagnosis.invisible if each.where not in shown),
             verdict=verdicts.get(diagnosis.verdict, diagnosis.verdict),
             causes=tuple(by_gain([*(self._with_numbers(cause, extended) for cause in self.causes), *diagnosis.causes])),
             too_small=(*self.too_small, *small),
