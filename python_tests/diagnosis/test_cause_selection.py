@@ -28,6 +28,7 @@ from tendonfmu.diagnosis.selection import (
     CERTAIN,
     OF_NOISE,
     OF_SAMPLE,
+    Judged,
     LeastSizes,
     Selection,
     names_with,
@@ -286,6 +287,19 @@ def test_places_that_differ_little_are_near(columns: Numbers, nominal: Numbers) 
     best = selection.refined("moment_arm_variation")
     assert best.where.tendon == 1
     assert [each.where.tendon for each in selection.near(best)] == [2]
+
+
+def test_one_place_is_near_several_of_a_joint_but_not_all(columns: Numbers, nominal: Numbers) -> None:
+    made = [replace(each, expected=(1.0,)) for each in FOUR]
+    selection = selection_of(noise(12) + 0.3 * columns[:, :, 2], nominal, columns[:, :, :4], made)
+    here, joint, whole = (
+        next(each for each in selection.candidates if each.where == Where("load_friction", *place))
+        for place in ((2, 1), (2, None), (None, None))
+    )
+    unseen = selection.refined("load_friction").unseen
+    alone = {each.where for each in selection.near(Judged(**vars(joint), unseen=1.02 * unseen))}
+    assert here.where in alone and whole.where not in alone
+    assert here.where not in {each.where for each in selection.near(Judged(**vars(whole), unseen=1.02 * unseen))}
 
 
 # --- gains ------------------------------------------------------------------------------------------------------------

@@ -11,8 +11,8 @@ certain. The rules by which a round chooses a cause, in their order:
    mislead. A correction of the torque may replace only another one: it resembles most effects (`_to_fit`).
 5. Of fits that are alike, torque that depends on the angles comes first, since friction takes it up; else the one with
    fewest numbers.
-6. The effect is fitted at the nearly best places, too, and the best is taken; a finer one if it is better by more
-   than what does not count.
+6. The effect is fitted at the nearly best places, too, and the best is taken; in place of several of a joint or tendon
+   one alone if it is better by more than what does not count.
 7. A single sensor may be several, if their usual errors explain nearly as much (`beside_calibration`).
 """
 

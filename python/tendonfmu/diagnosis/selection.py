@@ -17,7 +17,7 @@ import numpy as np
 from scipy.stats import ttest_1samp
 
 from tendonfmu.arrays import Data, Numbers
-from tendonfmu.diagnosis.candidate_columns import HERE, LARGEST_SECANT, Candidate
+from tendonfmu.diagnosis.candidate_columns import HERE, LARGEST_SECANT, SOMEWHERE, Candidate
 from tendonfmu.diagnosis.effects import COMMON, Mechanism, Place, Term, Where, title_of
 from tendonfmu.diagnosis.result import ABSORBED, NO_GAIN, Invisible, Sensor, with_error
 from tendonfmu.model import extended_row, moment_arms
@@ -273,12 +273,13 @@ class Selection:
         return chosen
 
     def near(self, best: Judged) -> list[Judged]:
-        """Return the same effect at other places, no coarser ones, that are nearly as good, the best first."""
+        """Return the effect at other places that are nearly as good, the best first: of its level, or one alone."""
         least = float(best.unseen.sum())
         most = least + NEAR * (float(self.base.sum()) - least)
+        levels = (best.level, HERE) if best.level == SOMEWHERE else (best.level,)  # what is everywhere is simple, too
         near: dict[Where, int] = {}
         for k, (error, candidate, _, _) in enumerate(self._results):
-            same = candidate.effect == best.effect and candidate.level >= best.level
+            same = candidate.effect == best.effect and candidate.level in levels
             if same and candidate.where != best.where and error <= most:
                 near.setdefault(candidate.where, k)
         return [self._judged(k) for k in near.values()]
