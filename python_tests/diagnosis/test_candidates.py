@@ -139,6 +139,14 @@ def test_a_cover_may_harden_about_any_angle_near_rest(case: Case) -> None:
     assert variant.signs == (1, 1)
 
 
+def test_an_arm_changes_about_the_middle_of_the_range(case: Case) -> None:
+    for proposal, variant in case.proposals("moment_arm_variation"):
+        row = variant.at([-2e-4])["extensions"][-1]
+        assert proposal.place.joint is not None and row["slope"] == -2e-4
+        low, high = case.span.angle[proposal.place.joint - 1]
+        assert row["correction"] == pytest.approx(1e-4 * (low + high), rel=1e-9) and row["correction"] != 0.0
+
+
 def by_difference(case: Case, base: Data, numbers: Mapping[str, float], step: float) -> Numbers:
     changed = own_copy(base)
     for path, share in numbers.items():
