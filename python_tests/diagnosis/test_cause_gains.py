@@ -17,7 +17,7 @@ from tendonfmu.diagnosis.candidate_columns import HERE, SOMEWHERE
 from tendonfmu.diagnosis.effects import Place, Term, Where, by_name
 from tendonfmu.diagnosis.effects.mechanism import Sizes
 from tendonfmu.diagnosis.effects.words import presliding
-from tendonfmu.diagnosis.extension_fit import Row, memory_terms
+from tendonfmu.diagnosis.extension_fit import MemoryTerm, Row, memory_terms
 from tendonfmu.diagnosis.result import Cause
 from tendonfmu.diagnosis.search import FORM, ExtensionSearch, Trial, _of_start
 from tendonfmu.diagnosis.selection import Judged, names_needed
@@ -146,6 +146,29 @@ def test_the_last_check_compares_with_all_that_the_memory_explains(monkeypatch: 
     assert bench.shares_of_memory(models["full"], without) == [np.inf, np.inf], "no memory"
 
 
+def test_a_part_of_the_memory_that_is_not_certain_stays_in_presliding(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Presliding alone is uncertain; with relaxation in it, it is certain. What gains nothing is weak as before."""
+    element, cord = {"effect": "presliding", "displacement": 0.1}, {"effect": "cord_stretch", "stiffness": 1e4}
+    relaxing = {**element, "relaxation_time": 0.5}
+    rows = {"presliding": (element,), "relaxation": (relaxing,), "cord_stretch": (cord,)}
+    given = [Judged(Where(name), (MemoryTerm(by_name(name), Place(), rows=own),)) for name, own in rows.items()]
+    bench = whole._Bench.__new__(whole._Bench)
+    bench._found = cast("Any", SimpleNamespace(base=SimpleNamespace(least=SimpleNamespace(shows_all=lambda *_: True))))
+    monkeypatch.setattr(bench, "fit", lambda causes: SimpleNamespace(data=None))
+    monkeypatch.setattr(bench, "each_without", lambda causes: [bench.fit(causes)] * len(causes))
+    monkeypatch.setattr(bench, "shares_of_memory", lambda fit, without: [1.0] * len(without))
+    gains = {"presliding": Interval(0.4, 0.2, 0.6), "relaxation": Interval(0.08, -0.02, 0.2)}
+    for of_cords, names in ((0.08, ["presliding"]), (0.01, ["presliding", "cord_stretch"])):
+        gains["cord_stretch"] = Interval(of_cords, -0.1, 0.2)
+        monkeypatch.setattr(bench, "with_gain", lambda cause, *_: replace(cause, gain=gains[cause.effect]))
+        causes, weak = bench.judged(0.03, given)
+        assert [cause.effect for cause in causes] == names and [causes[k].effect for k in weak] == names[1:]
+        ((term,), *_) = (cause.terms for cause in causes)
+        assert term.added_to({})["extensions"] == [relaxing, cord][: 3 - len(names)]
+    assert whole.remembered(given[1:], given[1]) is None, "described presliding"
+    assert whole.remembered(given, Judged(Where("gravity", 1))) is None
+
+
 ELEMENT, CORD = {"effect": "presliding", "displacement": 0.1}, {"effect": "cord_stretch", "stiffness": 1e4}
 RELAXING = {**ELEMENT, "relaxation_time": 0.5}
 
@@ -166,8 +189,9 @@ def test_a_memory_that_is_new_is_one_cause(
     """A part of it that a described one lacks has a name of its own. What looks like another form may be one."""
     other = {"effect": "time_delay", "delay": 0.001}
     data: dict[str, Any] = {"extensions": [other, *map(dict, given)]}
-    found = [_of_start(terms) for terms in memory_terms(data, chosen)]
+    found = whole.one_memory([_of_start(terms) for terms in memory_terms(data, chosen)])
     assert {cause.effect: [rival.effect for rival in cause.alike] for cause in found} == causes
+    assert all(rival.terms for cause in found for rival in cause.alike)
     for cause in found:
         data = cause.terms[0].added_to(data)
     assert data["extensions"] == [other, *chosen]

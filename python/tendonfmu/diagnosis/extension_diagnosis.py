@@ -17,12 +17,16 @@ from tendonfmu.diagnosis.delay import DELAY
 from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION, Place, Term, Where
 from tendonfmu.diagnosis.effects.places import law_of
 from tendonfmu.diagnosis.extension_fit import (
+    CORDS,
+    PRESLIDING,
+    RELAXATION,
     FittedModel,
     cause_parameters,
     fit_extended,
     intervals_of,
     memory_of,
     with_known,
+    with_part,
 )
 from tendonfmu.diagnosis.gain import Gain, Unseen, measure_gain
 from tendonfmu.diagnosis.names import size_of
@@ -83,6 +87,31 @@ def _rivals(cause: Judged, named: Collection[str]) -> tuple[Judged, ...]:
     return tuple(rivals.values())
 
 
+def remembered(causes: Sequence[Judged], part: Judged) -> list[Judged] | None:
+    """Return the causes with a part of the memory in presliding, whose name it shares; None if it is none of these."""
+    whole = next((cause for cause in causes if cause.effect == PRESLIDING), None)
+    if whole is None or part.effect not in (RELAXATION, CORDS):
+        return None
+    joined = replace(whole, terms=(with_part(whole.terms[0], part.terms[0]),))
+    return [joined if cause is whole else cause for cause in causes if cause is not part]
+
+
+def one_memory(causes: Sequence[Judged]) -> list[Judged]:
+    """Return the causes with all parts of a memory as one: a form is chosen because it imitates friction best.
+
+    What else looks like the whole is a part alone, and what looks like a part another form of the whole.
+    """
+    one = list(causes)
+    parts = [cause for cause in causes if cause.effect in (RELAXATION, CORDS)]
+    for part in parts:
+        one = remembered(one, part) or one
+    if len(one) == len(causes):
+        other = {each.effect: (*each.alike, Judged(Where(PRESLIDING), each.terms)) for each in parts}
+        return [replace(each, alike=other[CORDS]) if each.effect == CORDS else each for each in one]
+    alone = tuple(Judged(part.where, part.terms) for part in parts)
+    return [replace(each, alike=(*each.alike, *alone)) if each.effect == PRESLIDING else each for each in one]
+
+
 class _Bench:
     """Fits of any set of causes, and what they leave of unseen data."""
 
@@ -105,7 +134,10 @@ class _Bench:
         self._order: dict[frozenset[int], list[Term]] = {next(iter(self._fits)): terms_of(found.causes)}
 
     def judged(self, least_gain: float, causes: list[Judged]) -> tuple[list[Judged], list[int]]:
-        """Return causes with their gains, and which of them are weak."""
+        """Return causes with their gains, and which of them are weak.
+
+        A part of the memory that is material but not certain stays in presliding: without it, that may be neither.
+        """
         fit, without = self.fit(causes), self.each_without(causes)
         judged = [self.with_gain(cause, model, fit) for cause, model in zip(causes, without, strict=True)]
         needed, shares = names_needed(judged), self.shares_of_memory(fit, without)
@@ -119,11 +151,17 @@ class _Bench:
                 and self._found.base.least.shows_all(cause.effect, cause.terms, fit.data)
             )
         ]
+        for part in (judged[k] for k in weak if judged[k].gain.value >= least_gain):
+            if joined := remembered(judged, part):
+                return self.judged(least_gain, joined)
         return judged, weak
 
     def verified(self, least_gain: float) -> Verified:
         """Measure the gain of each cause on unseen data and drop the weak ones."""
-        causes, dropped = confirmed(merged(self._found.causes), partial(self.judged, least_gain))
+        kept, dropped = confirmed(merged(self._found.causes), partial(self.judged, least_gain))
+        causes, _ = self.judged(least_gain, one_memory(kept))
+        if any(cause.effect == PRESLIDING for cause in causes):
+            dropped = [cause for cause in dropped if cause.effect not in (RELAXATION, CORDS)]
         ranked, fit, nominal = by_gain(causes), self.fit(causes), self.written(self.nominal)
         places, intervals = self.numbers(fit, causes)
         between = [self.fit(ranked[: k + 1]).data for k in range(len(ranked) - 1)]

@@ -54,44 +54,43 @@ Row = Mapping[str, Any]  # of `extensions`
 
 @dataclass(frozen=True)
 class MemoryTerm(Term):
-    """The memory, or a part of it; its rows take the place of what the description has of it."""
+    """A part of the memory; its rows take the place of what the description has of it."""
 
     rows: tuple[Row, ...] = ()
-
-    @property
-    def parts(self) -> tuple[MemoryTerm, ...]:
-        """Presliding that relaxes, or along cords that stretch, looks much like these alone, and like another form."""
-        if self.mechanism.name == CORDS:
-            return (_term(PRESLIDING, ()),)
-        names = [RELAXATION] if any("relaxation_time" in row for row in self.rows) else []
-        names += [CORDS] if any(row["effect"] == CORDS for row in self.rows) else []
-        return tuple(_term(name, ()) for name in names if name != self.mechanism.name)
 
     def added_to(self, data: Data) -> dict[str, Any]:
         """Return the description with this part."""
         present = list(data.get("extensions") or [])
-        others = [row for row in present if row["effect"] not in (PRESLIDING, CORDS)]
         elements = [row for row in present if row["effect"] == PRESLIDING]
+        others = [row for row in present if row["effect"] not in (PRESLIDING, CORDS)]
         cords = [row for row in present if row["effect"] == CORDS]
-        if self.mechanism.name == RELAXATION:
+        if self.mechanism.name == PRESLIDING:
+            elements = [dict(row) for row in self.rows]
+        elif self.mechanism.name == RELAXATION:
             times = [row["relaxation_time"] for row in self.rows]
             elements = [{**row, "relaxation_time": time} for row, time in zip(elements, times, strict=True)]
         else:
-            elements, cords = (elements if self.mechanism.name == CORDS else []), [dict(row) for row in self.rows]
+            cords = [dict(row) for row in self.rows]
         return {**data, "extensions": [*others, *elements, *cords]}
 
 
-def memory_terms(data: Data, rows: Sequence[Row]) -> list[tuple[Term, ...]]:
-    """Return what a description lacks of the rows of a memory, as the terms of causes.
+def with_part(presliding: Term, part: Term) -> MemoryTerm:
+    """Return the term of presliding with relaxation or cords of its own."""
+    assert isinstance(presliding, MemoryTerm) and isinstance(part, MemoryTerm)
+    of_cords = part.mechanism.name == CORDS
+    others = [row for row in presliding.rows if (row["effect"] == CORDS) != of_cords]
+    return replace(presliding, rows=(*others, *part.rows) if of_cords else (*part.rows, *others))
 
-    Where it has no presliding, or of another form, that is one cause, with relaxation and cords: recordings choose a
-    form that imitates friction best, and do not tell whether its parts are what moves there.
-    """
-    given, parts = memory_of(data), list[tuple[Term, ...]]()
-    chosen, described = ([row for row in each if row["effect"] == PRESLIDING] for each in (rows, given))
-    if [_form(row) for row in chosen] != [_form(row) for row in described]:
-        return [(_term(PRESLIDING, tuple(rows)),)] if chosen else parts
-    relaxing = chosen and all("relaxation_time" in row for row in chosen)
+
+def memory_terms(data: Data, rows: Sequence[Row]) -> list[tuple[Term, ...]]:
+    """Return what a description lacks of the rows of a memory, each part as the terms of one cause."""
+    given = memory_of(data)
+    chosen = [row for row in rows if row["effect"] == PRESLIDING]
+    parts: list[tuple[Term, ...]] = []
+    if [_form(row) for row in chosen] != [_form(row) for row in given if row["effect"] == PRESLIDING]:
+        bare = tuple({key: value for key, value in row.items() if key != "relaxation_time"} for row in chosen)
+        parts.append((_term(PRESLIDING, bare),))
+    relaxing = all("relaxation_time" in row for row in chosen) and chosen
     if relaxing and not any("relaxation_time" in row for row in given):
         parts.append((_term(RELAXATION, tuple(chosen)),))
     cords = tuple(row for row in rows if row["effect"] == CORDS)
@@ -343,6 +342,9 @@ def possible(data: Mapping[str, Any], causes: Sequence[Term]) -> list[Term]:
     kept = []
     for cause in causes:
         path = changed_law(cause)
+        alone = not any(row["effect"] == PRESLIDING for row in memory_of(data))
+        if cause.mechanism.name in (RELAXATION, CORDS) and alone:  # they are part of a memory that has presliding
+            continue
         if path is None or any(effect.path == path for effect in effects(data)):
             data = cause.added_to(data)
             kept.append(cause)

@@ -34,7 +34,6 @@ from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION, OF_LAW, Place, 
 from tendonfmu.diagnosis.extension_fit import (
     REMEMBERING,
     FittedModel,
-    MemoryTerm,
     extended_description,
     fit_extended,
     memory_of,
@@ -374,10 +373,7 @@ def terms_of(causes: Sequence[Judged]) -> list[Term]:
 def _of_start(terms: tuple[Term, ...]) -> Judged:
     """Return a cause of the base, at one place or several."""
     place = terms[0].place if len(terms) == 1 else Place()
-    parts = (part for term in terms if isinstance(term, MemoryTerm) for part in term.parts)
-    return Judged(
-        Where(terms[0].mechanism.name, *place), terms, alike=tuple(Judged(part.where, (part,)) for part in parts)
-    )
+    return Judged(Where(terms[0].mechanism.name, *place), terms)
 
 
 # --- from recordings to causes ---------------------------------------------------------------------------------------
