@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
@@ -21,6 +21,7 @@ from tendonfmu.diagnosis.extension_fit import (
     PRESLIDING,
     RELAXATION,
     FittedModel,
+    MemoryTerm,
     cause_parameters,
     fit_extended,
     intervals_of,
@@ -99,17 +100,21 @@ def remembered(causes: Sequence[Judged], part: Judged) -> list[Judged] | None:
 def one_memory(causes: Sequence[Judged]) -> list[Judged]:
     """Return the causes with all parts of a memory as one: a form is chosen because it imitates friction best.
 
-    What else looks like the whole is a part alone, and what looks like a part another form of the whole.
+    What else looks like the whole is a part alone, and what looks like cords that stretch is another form of the whole.
     """
     one = list(causes)
-    parts = [cause for cause in causes if cause.effect in (RELAXATION, CORDS)]
-    for part in parts:
+    for part in causes:
         one = remembered(one, part) or one
-    if len(one) == len(causes):
-        other = {each.effect: (*each.alike, Judged(Where(PRESLIDING), each.terms)) for each in parts}
-        return [replace(each, alike=other[CORDS]) if each.effect == CORDS else each for each in one]
-    alone = tuple(Judged(part.where, part.terms) for part in parts)
-    return [replace(each, alike=(*each.alike, *alone)) if each.effect == PRESLIDING else each for each in one]
+    return [replace(each, alike=(*each.alike, *_other_memory(each))) for each in one]
+
+
+def _other_memory(cause: Judged) -> Iterator[Judged]:
+    names = [PRESLIDING] if cause.effect == CORDS else []
+    if cause.effect == PRESLIDING and isinstance(cause.terms[0], MemoryTerm):
+        rows = cause.terms[0].rows
+        names += [RELAXATION] if any("relaxation_time" in row for row in rows) else []
+        names += [CORDS] if any(row["effect"] == CORDS for row in rows) else []
+    return (Judged(Where(name), cause.terms) for name in names)
 
 
 class _Bench:
