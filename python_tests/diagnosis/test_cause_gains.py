@@ -197,6 +197,36 @@ def test_a_memory_that_is_new_is_one_cause(
     assert data["extensions"] == [other, *chosen]
 
 
+def test_what_is_verified_has_one_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Cords that unseen data confirm are in presliding, relaxation that they refute is neither named nor dropped."""
+    rows = {"presliding": (ELEMENT,), "relaxation": (RELAXING,), "cord_stretch": (CORD,)}
+    found = [Judged(Where(name), (MemoryTerm(by_name(name), Place(), rows=own),)) for name, own in rows.items()]
+    bench = whole._Bench.__new__(whole._Bench)
+    bench._found = cast("Any", SimpleNamespace(causes=[*found, Judged(Where("gravity", 1), p_value=1.0)]))
+    bench._settings, bench._seed, bench._data = cast("Any", SimpleNamespace(threads=1)), 0, ([], [])
+    bench.nominal = cast("Any", None)
+
+    def judged(_: float, causes: list[Judged]) -> tuple[list[Judged], list[int]]:
+        weak = [k for k, cause in enumerate(causes) if cause.effect in ("relaxation", "gravity")]
+        return [replace(cause, gain=Interval(0.3, 0.2, 0.4)) for cause in causes], weak
+
+    stubs: dict[str, Any] = {
+        "judged": judged,
+        "fit": lambda causes: SimpleNamespace(data={}),
+        "each_without": lambda causes: [],
+        "written": lambda model: {},
+        "numbers": lambda fit, causes: ({id(term): None for cause in causes for term in cause.terms}, {}),
+    }
+    for name, stub in stubs.items():
+        monkeypatch.setattr(bench, name, stub)
+    monkeypatch.setattr(whole, "measure_gain", lambda *_, **__: None)
+    verified = bench.verified(0.03)
+    (cause,) = verified.causes
+    assert cause.effect == "presliding" and [rival.effect for rival in cause.alike] == ["cord_stretch"]
+    assert cause.terms[0].added_to({})["extensions"] == [ELEMENT, CORD]
+    assert [each.effect for each in verified.dropped] == ["gravity"]
+
+
 def test_only_laws_of_the_nominal_description_are_asked_about(monkeypatch: pytest.MonkeyPatch) -> None:
     """Joint 1 of the nominal finger has friction of its own; friction by the load is a cause of the extended one."""
     span = SimpleNamespace(speed=np.ones(2), tendon_speed=np.full((4, 2), 0.01))

@@ -27,7 +27,8 @@ fuzz() {
   if [[ -d $folder/corpus/$name ]]; then arguments+=("$folder/corpus/$name"); fi
   if [[ $name == *json* || $name == *rig* ]]; then arguments+=("-dict=$folder/keys.dict"); fi
   limit=10 # s
-  if [[ $name == *plant* ]]; then limit=60; fi # a debug build that integrates to the smallest tolerance
+  # a debug build that integrates to the smallest tolerance, or a stiff rig
+  if [[ $name == *plant* || $name == *rig* ]]; then limit=60; fi
   log=$build/$name.log
   if "$program" -max_total_time="$seconds" -timeout="$limit" -rss_limit_mb=4096 -print_final_stats=1 \
     -artifact_prefix="$build/findings/$name-" "${arguments[@]}" >"$log" 2>&1; then

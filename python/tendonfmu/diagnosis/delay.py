@@ -1,4 +1,4 @@
-"""Whether forces are later than positions: what the tendons' equation says, else what the torque does."""
+"""What the tendons' equation says of delays, springs and arms, and what the torque says of a delay it leaves open."""
 
 from __future__ import annotations
 
@@ -56,16 +56,15 @@ def _further(finger: Finger, angle: Numbers) -> Numbers:
     for row in extension_rows(finger.data):
         if row["effect"] in CHANGING:
             at, turns = angle[:, row["joint"] - 1], float(row.get("turns") or 1.0)
-            slope, fixed, sine, cosine = (
-                float(row.get(key) or 0.0) for key in ("slope", "correction", "sine", "cosine")
-            )
+            keys = ("slope", "correction", "sine", "cosine")
+            slope, fixed, sine, cosine = (float(row.get(key) or 0.0) for key in keys)
             wave = cosine * np.sin(turns * at) - sine * np.cos(turns * at)
             travel[:, row["tendon"] - 1] += slope * at**2 / 2.0 + fixed * at + wave / turns
     return travel
 
 
 class Positions:
-    """What positions tell of a delay, whatever friction is.
+    """What positions tell of a delay, and whether they contradict springs and arms, whatever friction is.
 
     With joint encoders, or more tendons than joints, the joint-side positions x0 − f0/k agree with the angles, or with
     each other, only if positions and forces are of the same time. Where the angles are those of encoders, the tendons'
@@ -123,9 +122,8 @@ class Positions:
         linear = with_linear_springs(finger or self._finger, recording.recording).groups["tendon_position"]
         early = np.zeros(linear.shape)
         if self._measured:
-            early -= groups["joint_position"] @ self._arms.T + _further(
-                finger or self._finger, groups["joint_position"]
-            )
+            angle = groups["joint_position"]
+            early -= angle @ self._arms.T + _further(finger or self._finger, angle)
         position, stretch = groups["tendon_position"], groups["tendon_force"] / self._stiffness
         late = linear - position - stretch
         early, late = (early, late + position) if self._behind else (early + position, late)

@@ -163,8 +163,12 @@ class _Bench:
 
     def verified(self, least_gain: float) -> Verified:
         """Measure the gain of each cause on unseen data and drop the weak ones."""
-        kept, dropped = confirmed(merged(self._found.causes), partial(self.judged, least_gain))
-        causes, _ = self.judged(least_gain, one_memory(kept))
+        judge = partial(self.judged, least_gain)
+        kept, dropped = confirmed(merged(self._found.causes), judge)
+        causes = one_memory(kept)
+        if len(causes) < len(kept):
+            causes, weak = confirmed(causes, judge)
+            dropped += weak
         if any(cause.effect == PRESLIDING for cause in causes):
             dropped = [cause for cause in dropped if cause.effect not in (RELAXATION, CORDS)]
         ranked, fit, nominal = by_gain(causes), self.fit(causes), self.written(self.nominal)

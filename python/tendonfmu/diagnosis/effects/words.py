@@ -42,14 +42,9 @@ def presliding(numbers: Sizes) -> str:
         of_unit.setdefault(unit, []).append(value)
     ranges = {unit: dict.fromkeys(_shown(end, unit) for end in (min(own), max(own))) for unit, own in of_unit.items()}
     sized = (f"{' to '.join(ends)} at {'joint' if 'rad' in unit else 'tendon'}s" for unit, ends in ranges.items())
-    return text.format(", ".join(sized)) + memory_parts(numbers)
-
-
-def memory_parts(numbers: Sizes) -> str:
-    """Return what a memory has beside presliding."""
-    text = ", fading within {} at rest" if "relaxation_time" in numbers else ""
-    text = text.format(quantity(*numbers["relaxation_time"][0])) if text else ""
-    return text + (f", along cords of {quantity(*numbers['cords'][0])}" if "cords" in numbers else "")
+    more = (("relaxation_time", ", fading within {} at rest"), ("cords", ", along cords of {}"))
+    parts = (words.format(quantity(*numbers[part][0])) for part, words in more if part in numbers)
+    return text.format(", ".join(sized)) + "".join(parts)
 
 
 def _shown(value: float, unit: str) -> str:
