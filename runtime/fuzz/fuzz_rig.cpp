@@ -91,6 +91,9 @@ void can_be_used(const json_tree& rig) {
     if (good) {
       can_be_moved(plant, begin);
     }
+    if (steady_clock::now() - begin > patience) {
+      return;
+    }
   }
 }
 
