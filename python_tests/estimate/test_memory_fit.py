@@ -151,6 +151,7 @@ def prepared(*rows: dict[str, Any], seed: int = 1) -> FitRecording:
         ((), "none"),
         ((RELATIVE,), "relative"),
         (({**ABSOLUTE, "relaxation_time": 0.8},), "absolute"),
+        (({**RELATIVE, "follows_limit": 1.0},), "relative"),
     ],
 )
 def test_the_form_is_chosen_by_what_is_left_out(truth: Rows, name: str) -> None:

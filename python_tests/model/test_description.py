@@ -233,7 +233,8 @@ def test_numbers_of_extensions_are_those_of_the_runtime() -> None:
     listed = {number.path: number.value for number in friction_numbers(description) if number.extension}
     assert list(listed.items()) == [(path, value) for path, value in known.items() if path in listed]
     # turns, reaction, and beyond twice: of the mechanism, and not given; and what six rows of presliding do not have
-    assert len(known) - len(listed) == 4 + 3 * 3 + 2 + 3 + 2
+    # or choose
+    assert len(known) - len(listed) == 4 + 3 * 3 + 2 + 3 + 2 + 6
 
 
 @pytest.mark.parametrize(

@@ -162,3 +162,17 @@ def test_the_most_specific_rows_hold() -> None:
         run({"displacement": 0.25}, {"level": 1} | other, *tendons), run({"displacement": 0.25}), rtol=1e-9, atol=1e-12
     )
     np.testing.assert_allclose(run({"tendon": 2} | other, *places), run(*places), rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
+def test_friction_held_at_rest_follows_the_limit_as_far_as_it_is_told(share: float) -> None:
+    rows = [{"effect": "presliding", "joint": 1, "displacement": 0.1, "follows_limit": share}]
+    time = np.arange(40) * 1e-2
+    force = np.where(time < 0.2, 10.0, 25.0)
+    speed = np.where(time < 0.1, 0.5, 0.0)
+    speed[0] = 0.0
+    load = {"static": 5e-3, "coulomb": 5e-3, "stribeck_velocity": 1.0}
+    held = of_joint(rows, time, speed, force, law={"static": 0.0, "coulomb": 0.0, "stribeck_velocity": 1.0}, load=load)
+    before, after = held[15], held[-1]
+    assert before == pytest.approx(0.45 * 5e-3 * 10.0, rel=1e-9)
+    assert after == pytest.approx(before * (1.0 + 1.5 * share), rel=1e-9)

@@ -32,6 +32,7 @@ class Element:
     stiffness: float  # κ; 0: by distance
     distance: float  # D
     time: float  # T; 0: none
+    follows: float  # p
 
     def decay(self, dt: float) -> tuple[float, float]:
         """a and g."""
@@ -75,6 +76,7 @@ class Elements:
         self.compliance = 1.0 / stretch[0] if stretch and self.rows else 0.0
         self.R, self.thresholds, self.branches = R, thresholds, branches
         self.forces: dict[Place, list[float]] = {}  # F of each element
+        self.limits: dict[Place, float] = {}  # lim
         self.tension: dict[Place, float] = {}  # f behind a place
         self.first, self.dt = True, 0.0
 
@@ -93,7 +95,11 @@ class Elements:
             stiffness *= float(np.mean(self.R[:, place[1]] ** 2)) if own else 1.0
             distance *= self.thresholds[1 if own else 0]
         return Element(
-            float(given(row, "share", 1.0)) / total, stiffness, distance, float(given(row, "relaxation_time", 0.0))
+            float(given(row, "share", 1.0)) / total,
+            stiffness,
+            distance,
+            float(given(row, "relaxation_time", 0.0)),
+            float(given(row, "follows_limit", 0.0)),
         )
 
     # --- a sample
@@ -133,7 +139,11 @@ class Elements:
         before = self.forces.get(place, [0.0] * len(elements))
         limits = [element.share * limit for element in elements]
         rates = [element.rate(self.dt, most) for element, most in zip(elements, limits, strict=True)]
-        carried = [element.decay(self.dt)[0] * F for element, F in zip(elements, before, strict=True)]
+        was = self.limits.get(place, 0.0)
+        ratios = [1.0 + element.follows * (limit / was - 1.0) if was else 1.0 for element in elements]
+        carried = [
+            element.decay(self.dt)[0] * ratio * F for element, ratio, F in zip(elements, ratios, before, strict=True)
+        ]
         trials = _solve(carried, rates, turned, compliance)
         slips = [self._slips(place, e, 1, trials[e], limits[e], out) for e in range(len(elements))]
         if compliance and len(elements) == 2 and slips[0] != slips[1]:
@@ -147,7 +157,7 @@ class Elements:
             sign = out.decide(("slips_to", place, e), math.copysign(1.0, trial))
             forces.append(sign * limits[e] if slips[e] else trial)
             self.branches["element_slips" if slips[e] else "element_holds"] += 1
-        self.forces[place] = forces
+        self.forces[place], self.limits[place] = forces, limit
         return sum(forces)
 
     def _slips(self, place: Place, e: int, turn: int, trial: float, limit: float, out: Step) -> bool:

@@ -91,6 +91,7 @@ const finger_row state_rows[] = {
     {ROW(remembered.element), .unit = OF_ELEMENTS, .count = 2, .when = WITH_MEMORY, WITHIN(A_SUM), .spare = 1},
     {ROWS(remembered.by_turning, remembered.by_limit), .unit = OF_SLOTS, .count = 2, .when = WITH_MEMORY,
      WITHIN(ANY_NUMBER), .spare = 1},
+    {ROW(remembered.held_limit), .unit = OF_SLOTS, .count = 2, .when = WITH_MEMORY, .high = A_SUM, .spare = 1},
     {ROW(remembered.tension), .unit = OF_SLOTS, .count = 2, .when = WITH_CORDS, WITHIN(ANY_NUMBER), .spare = 1},
     {ROW(remembered.extension), .unit = OF_EXTENSIONS, WITHIN(ANY_NUMBER), .spare = 1},
 };
@@ -101,7 +102,7 @@ static const finger_row next_rows[] = {
     {SENSORS(scratch.sensor), .unit = OF_TENDONS, .when = MODEL_HAS_SENSOR_FAULT},
     {ROW(scratch.watch), .unit = OF_JOINTS, .when = MODEL_HAS_SENSOR_FAULT},
     {ROW(scratch.element), .unit = OF_ELEMENTS, .count = 2, .when = WITH_MEMORY},
-    {ROWS(scratch.by_turning, scratch.by_limit), .unit = OF_SLOTS, .count = 2, .when = WITH_MEMORY},
+    {ROWS(scratch.by_turning, scratch.held_limit), .unit = OF_SLOTS, .count = 2, .when = WITH_MEMORY},
     {ROW(scratch.tension), .unit = OF_SLOTS, .count = 2, .when = WITH_CORDS},
     {ROW(scratch.extension), .unit = OF_EXTENSIONS},
 };

@@ -53,6 +53,7 @@ typedef struct friction_element {
   double* share;                    /* w; 0: there is no such element */
   double *stiffness, *per_distance; /* κ, 0 in relative form; 1/D, 0 in absolute form */
   double* relaxation_time;          /* T; 0: none */
+  double* follows;                  /* p, of the friction held, by the limit */
   double *kept, *stiff, *soft;      /* a, g·κ, g/D of the present step */
 } friction_element;
 
@@ -61,6 +62,7 @@ typedef struct friction_memory {
   double compliance; /* of the cords, 1/k_c, m/N; 0: rigid */
   double stretch;    /* the same in the present step: 0 in the first */
   int relaxes;       /* some place has a relaxation time */
+  int follows;       /* at some place p > 0 */
   double step;       /* that kept, stiff, soft are of, s */
   double* remembers; /* [n × M + N] 1 or 0 */
   double* sections;  /* [n × M + N] S, of the cord from a level to the tendon's end */
@@ -156,6 +158,7 @@ typedef struct finger_state {
   /* with a memory of friction only; edges in the first row of slots, pulleys in the second */
   double* element;               /* [elements × 2 × (n × M + N)] F of each element, N, N·m */
   double *by_turning, *by_limit; /* [2 × (n × M + N)] ∂F/∂c0, ∂F/∂lim of the last sample */
+  double* held_limit;            /* [2 × (n × M + N)] lim, N, N·m */
   double* tension;               /* [2 × (n × M + N)] f behind a place, N; with cord_stretch only */
   double* extension;             /* as the extensions ask for */
 } finger_state;
@@ -263,10 +266,10 @@ typedef struct finger_scratch {
   double *grip, *grip_slope; /* [n × M + N] what friction rows make of F and b, and ∂/∂v; with extensions only */
   double* bias_grip;         /* [n × M + N] the same of b: 0 where nothing sticks */
   /* with a memory only */
-  double* own_limit;                                 /* [N] N·m, what torque rows add to the limit of a joint */
-  double* travelled;                                 /* [n × M + N] Δ */
-  double *element, *by_turning, *by_limit, *tension; /* as in the state, after this sample */
-  effect_sample sample;                              /* as the extensions see it */
+  double* own_limit; /* [N] N·m, what torque rows add to the limit of a joint */
+  double* travelled; /* [n × M + N] Δ */
+  double *element, *by_turning, *by_limit, *held_limit, *tension; /* as in the state, after this sample */
+  effect_sample sample;                                           /* as the extensions see it */
 } finger_scratch;
 
 typedef struct step_kernel step_kernel;

@@ -16,7 +16,7 @@ const effect_action cord_stretch_action = {.kind = EFFECT_MEMORY};
 #define STEEPEST       1e290  /* 1/m, 1/rad, of z */
 
 /* numbers of a row of presliding, as in effects.json */
-enum { DISPLACEMENT, STIFFNESS, RELAXATION_TIME, SHARE };
+enum { DISPLACEMENT, STIFFNESS, RELAXATION_TIME, SHARE, FOLLOWS_LIMIT };
 
 /* how specific a row of presliding is at a slot; 0: it does not act there */
 static int rank_at(const tendonfmu_finger* f, effect_place place, size_t slot) {
@@ -58,7 +58,9 @@ static void set_element(tendonfmu_finger* f, size_t e, size_t slot, effect_place
   to->stiffness[slot] = absolute ? numbers[STIFFNESS] * scale : 0.0;
   to->per_distance[slot] = absolute ? 0.0 : 1.0 / (distance > LEAST_DISTANCE ? distance : LEAST_DISTANCE);
   to->relaxation_time[slot] = numbers[RELAXATION_TIME];
+  to->follows[slot] = numbers[FOLLOWS_LIMIT];
   f->memory.relaxes |= numbers[RELAXATION_TIME] > 0.0;
+  f->memory.follows |= numbers[FOLLOWS_LIMIT] > 0.0;
 }
 
 /* the rows that hold at a slot, at most two; none where the tendon moves no joint from there on */
@@ -87,6 +89,7 @@ static void find_elements(tendonfmu_finger* f, size_t slot) {
     to->stiffness[slot] = e < found ? to->stiffness[slot] : 0.0;
     to->per_distance[slot] = e < found ? to->per_distance[slot] : 1.0;
     to->relaxation_time[slot] = e < found ? to->relaxation_time[slot] : 0.0;
+    to->follows[slot] = e < found ? to->follows[slot] : 0.0;
   }
 }
 
@@ -139,7 +142,7 @@ static void find_decay(tendonfmu_finger* f, double step) {
 }
 
 void find_memory(tendonfmu_finger* f) {
-  f->memory.relaxes = 0;
+  f->memory.relaxes = f->memory.follows = 0;
   if (!elements_of(f)) {
     return;
   }

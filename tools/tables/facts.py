@@ -144,7 +144,7 @@ def _complaints(facts: Facts) -> Iterator[str]:
         yield f"keys.json: the keys of the document are {names}; expected the same in its `keys`"
     for effect in facts.effects["effects"]:
         for number in effect["numbers"]:
-            if ("default" in number) + ("required" in number) != 1 or not number["scale"] > 0:
+            if ("default" in number) + ("required" in number) != 1 or not number["scale"] >= 0:
                 yield f"effects.json: {effect['name']}.{number['key']}: expected default or required, and a scale"
     units = facts.outputs["units"]
     for row in (*facts.numbers, *(group for group in facts.groups if group["type"] == "Real")):

@@ -110,7 +110,8 @@ def _term(name: str, rows: tuple[Row, ...]) -> MemoryTerm:
 
 def _form(row: Row) -> tuple[Any, ...]:
     """Return what a row is about, whatever its numbers are."""
-    return tuple(row.get(key) for key in ("joint", "tendon", "level")), "displacement" in row, "share" in row
+    place = tuple(row.get(key) for key in ("joint", "tendon", "level"))
+    return place, "displacement" in row, "share" in row, bool(row.get("follows_limit"))
 
 
 # --- all numbers ------------------------------------------------------------------------------------------------------

@@ -46,6 +46,7 @@ DISTANCE = 2e-4  # m, to start from: what a cord on a pulley moves before it sli
 STEPS, TOLERANCE = 12, 0.3
 TIME = 0.1  # s, between the starts of `memory`
 SPLIT, SHARE = 0.4, 0.8  # ratio of a doubled element's numbers to the single one's, and share of the softer one
+FOLLOWS = "follows_limit"
 TYPICAL = 0.03  # friction of a place
 LONGER = 1.0, 30.0  # times the distance: relaxation within a sample imitates friction without any
 
@@ -128,17 +129,16 @@ class _Search:
     def grown(self, form: Form) -> Form:
         """Return a form with the parts that make it clearly better, and without those that do not."""
         data = self._finger.data
+        form = self.simpler(form, self.fit(f"{form.name}, by limit", _following(form.rows), near=form))
         cords = ({"effect": CORDS, "stiffness": stiffness} for stiffness in STRETCH)
         best = self.simpler(form, self.fit(f"{form.name}, cords", *[(*form.rows, row) for row in cords], near=form))
         rigid = _without_times(best.rows)
         starts = [_scaled(rigid, factor) for factor in LONGER]
         best = self.simpler(self.fit(f"{best.name}, no relaxation", *starts, near=best), best)
-        whole = best
-        best = self.simpler(best, self.fit(f"{best.name}, levels", _by_level(data, best.rows), near=best))
-        single = best
-        best = self.simpler(best, self.fit(f"{best.name}, two elements", _doubled(best.rows), near=best))
-        if best is not single is whole:  # levels may differ in both elements only
-            best = self.simpler(best, self.fit(f"{best.name}, levels", _by_level(data, best.rows), near=best))
+        levels = self.fit(f"{best.name}, levels", _by_level(data, best.rows), near=best)
+        for form in (best, levels):
+            best = self.simpler(best, form)
+            best = self.simpler(best, self.fit(f"{form.name}, two elements", _doubled(form.rows), near=form))
         for name, rows in _pruned(best):
             best = self.simpler(self.fit(name, rows, near=best), best)
         return best
@@ -209,7 +209,7 @@ def _by_level(data: Data, rows: Rows) -> Rows:
         if row["effect"] != PRESLIDING or {"joint", "level"} & set(row):
             split.append(row)
             continue
-        others: dict[str, Any] = {name: row[name] for name in ("relaxation_time", "share") if name in row}
+        others: dict[str, Any] = {name: row[name] for name in ("relaxation_time", "share", FOLLOWS) if name in row}
         if "displacement" in row:
             at = [row["displacement"] * number_of(data, f"velocity_threshold.{which}") for which in ("tendon", "joint")]
             split += _rows_of_places(data, "displacement", at[0], [at[1]] * len(data["joints"]), others)
@@ -232,6 +232,11 @@ def _scaled(rows: Rows, factor: float) -> Rows:
         power = 1.0 if key == "displacement" else -1.0
         scaled.append({**row, key: row[key] * factor**power} if row["effect"] == PRESLIDING else dict(row))
     return tuple(scaled)
+
+
+def _following(rows: Rows) -> Rows:
+    """Return rows whose friction held is in proportion to the limit."""
+    return tuple({**row, FOLLOWS: 1.0} if row["effect"] == PRESLIDING else dict(row) for row in rows)
 
 
 def _doubled(rows: Rows) -> Rows:

@@ -28,7 +28,7 @@ class EffectNumber:
     least: float  # its range
     most: float
     missing: float | None  # its value where it is left out; None if it is required
-    scale: float  # magnitude that matters on a hand of human size
+    scale: float  # magnitude that matters on a hand of human size; 0: it is chosen, not estimated
 
 
 Law = Mapping[str, Any]

@@ -164,7 +164,7 @@ def _of_extensions(data: Mapping[str, Any]) -> Iterator[Number]:
         for name, number in EFFECT_NUMBERS[row["effect"]].items():
             missing = number.missing or 0.0
             value = missing if row.get(name) is None else float(row[name])
-            if value != missing or not (missing or row["effect"] == "presliding"):
+            if number.scale and (value != missing or not (missing or row["effect"] == "presliding")):
                 yield Number(f"extensions[{k}].{name}", value, extension=row["effect"], size=number.scale)
 
 

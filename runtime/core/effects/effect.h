@@ -12,7 +12,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum { EFFECT_MAX_PARAMETERS = 4 };
+enum { EFFECT_MAX_PARAMETERS = 5 };
 
 /* The effects that are linked, a bit each by its id: all, unless a program's build says which its fingers have. */
 #ifndef TENDONFMU_EFFECTS
@@ -44,7 +44,7 @@ typedef struct effect_parameter {
 /* What else is known of it, for those who read descriptions and estimate: no part of a program that does neither. */
 typedef struct effect_expectation {
   double missing_value;    /* taken where the description leaves the key out; NaN: it must not */
-  double scale;            /* expected magnitude where nothing is known */
+  double scale;            /* expected magnitude where nothing is known; 0: a fit leaves it as it is */
   double scale_everywhere; /* of a row without a place; 0: the same */
 } effect_expectation;
 

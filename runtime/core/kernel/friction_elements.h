@@ -5,6 +5,7 @@
 #include "finger_memory.h"
 #include "quad.h"
 
+#define LEAST_LIMIT   1e-150
 #define LARGEST_LIMIT 1e15 /* of |F|, and of the friction of a joint, N·m: no product in a step overflows */
 
 enum { EDGES, PULLEYS }; /* rows of slots of what is remembered; a joint's own friction stands among the edges */
@@ -31,7 +32,8 @@ HOT_INLINE quad limit_of(quad friction) {
 /* One of their elements before it is clipped. */
 typedef struct trial {
   quad limit, rate; /* w·lim, β */
-  quad kept;        /* a·F′ */
+  quad kept;        /* a·F′, with what of it follows the limit */
+  quad by_limit;    /* slope of this by lim */
   quad held;        /* F, not clipped */
   quad_mask free;   /* it does not slip */
 } trial;
@@ -47,12 +49,25 @@ HOT_INLINE quad clip_to(quad value, quad limit) {
   return quad_max(0.0 - limit, quad_min(limit, value));
 }
 
+/* a·F′ of an element without what follows the limit, a·F′·p, whose slope by lim it returns */
+HOT_INLINE quad take_following(const tendonfmu_finger* f, size_t e, size_t slot, size_t at, quad* kept) {
+  if (!f->memory.follows) {
+    return quad_set(0.0);
+  }
+  const quad following = quad_load(f->memory.element[e].follows + slot) * *kept;
+  *kept -= following;
+  const quad before = quad_max(quad_set(LEAST_LIMIT), quad_load(f->remembered.held_limit + at));
+  return clip_to(following / before, quad_set(1.0)); /* of a restored state, too */
+}
+
 HOT_INLINE trial begin_trial(const tendonfmu_finger* f, const places* p, size_t e) {
   const friction_element* element = &f->memory.element[e];
   trial t;
   t.limit = quad_load(element->share + p->slot) * p->limit;
   t.rate = quad_load(element->stiff + p->slot) + quad_load(element->soft + p->slot) * t.limit;
   t.kept = quad_load(element->kept + p->slot) * quad_load(f->remembered.element + e * 2 * f->slots + p->at);
+  t.by_limit = take_following(f, e, p->slot, p->at, &t.kept);
+  t.kept += t.by_limit * p->limit;
   return t;
 }
 
@@ -81,16 +96,18 @@ HOT_INLINE void solve_pair(trial t[2], const places* p) {
 HOT_INLINE quad step_alone(tendonfmu_finger* f, const places* p) {
   const finger_scratch* s = &f->scratch;
   const friction_element* element = &f->memory.element[0];
-  const quad held = quad_load(element->kept + p->slot) * quad_load(f->remembered.element + p->at);
+  quad held = quad_load(element->kept + p->slot) * quad_load(f->remembered.element + p->at);
+  const quad following = take_following(f, 0, p->slot, p->at, &held);
   const quad stiff = quad_load(element->stiff + p->slot), soft = quad_load(element->soft + p->slot);
   const quad fixed = held + stiff * p->turned, by_limit = soft * p->turned;
   const quad share = quad_load(element->share + p->slot), limit = share * p->limit;
-  const quad trial = fixed + by_limit * limit, force = clip_to(trial, limit);
+  const quad trial = fixed + by_limit * limit + following * p->limit, force = clip_to(trial, limit);
   const quad_mask free = quad_greater(limit, quad_abs(trial));
   quad_store(s->element + p->at, force);
   quad_store(s->by_turning + p->at, quad_keep(free, stiff + soft * limit));
   const quad slips = quad_with_sign(quad_set(1.0), trial);
-  quad_store(s->by_limit + p->at, share * quad_select(free, by_limit, slips));
+  quad_store(s->by_limit + p->at, share * quad_select(free, by_limit, slips) + quad_keep(free, following));
+  quad_store(s->held_limit + p->at, quad_keep(slides_at(f, p->slot), p->limit));
   return force;
 }
 
@@ -125,7 +142,7 @@ HOT_INLINE quad step_places(tendonfmu_finger* f, const places* p) {
     const friction_element* element = &f->memory.element[e];
     const quad slips = quad_with_sign(quad_set(1.0), t[e].held);
     const quad own = quad_select(t[e].free, quad_load(element->soft + p->slot) * turned, slips);
-    by_limit += quad_load(element->share + p->slot) * own;
+    by_limit += quad_load(element->share + p->slot) * own + quad_keep(t[e].free, t[e].by_limit);
   }
   if (p->stretches) {
     const quad stiffness = 1.0 + by_turning * p->compliance;
@@ -134,6 +151,7 @@ HOT_INLINE quad step_places(tendonfmu_finger* f, const places* p) {
   }
   quad_store(s->by_turning + p->at, by_turning);
   quad_store(s->by_limit + p->at, by_limit);
+  quad_store(s->held_limit + p->at, quad_keep(slides_at(f, p->slot), p->limit));
   return sum;
 }
 
@@ -164,6 +182,7 @@ HOT_INLINE void remember_nothing(const tendonfmu_finger* f, size_t at) {
   }
   quad_store(f->scratch.by_turning + at, quad_set(0.0));
   quad_store(f->scratch.by_limit + at, quad_set(0.0));
+  quad_store(f->scratch.held_limit + at, quad_set(0.0));
 }
 
 /* The same of the joints' own friction. */

@@ -44,7 +44,9 @@ def presliding(numbers: Sizes) -> str:
     sized = (f"{' to '.join(ends)} at {'joint' if 'rad' in unit else 'tendon'}s" for unit, ends in ranges.items())
     more = (("relaxation_time", ", fading within {} at rest"), ("cords", ", along cords of {}"))
     parts = (words.format(quantity(*numbers[part][0])) for part, words in more if part in numbers)
-    return text.format(", ".join(sized)) + "".join(parts)
+    follows = max((value for value, _ in numbers.get("follows_limit", ())), default=0.0)
+    with_load = ", growing with the load at rest, too" if follows > 0.0 else ""
+    return text.format(", ".join(sized)) + with_load + "".join(parts)
 
 
 def _shown(value: float, unit: str) -> str:
