@@ -8,7 +8,7 @@ stays. Parts are added to the relative and to the absolute form, and the better 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -37,7 +37,8 @@ from tendonfmu.estimate.structure import Choice, Structure, build_structure, wit
 from tendonfmu.model import Finger, effects, moment_arms, number_of
 from tendonfmu.recordings import FitRecording, best_angles, make_grid, on_encoders
 
-Rows = tuple[dict[str, Any], ...]
+Row = dict[str, Any]  # of `extensions`
+Rows = tuple[Row, ...]
 
 FOLDS = 8
 NEAR = 1.5  # times the least squared error of a whole form: with its parts another one may be better
@@ -129,7 +130,8 @@ class _Search:
     def grown(self, form: Form) -> Form:
         """Return a form with the parts that make it clearly better, and without those that do not."""
         data = self._finger.data
-        form = self.simpler(form, self.fit(f"{form.name}, by limit", _following(form.rows), near=form))
+        following = _changed(form.rows, lambda _: {FOLLOWS: 1.0})
+        form = self.simpler(form, self.fit(f"{form.name}, by limit", following, near=form))
         cords = ({"effect": CORDS, "stiffness": stiffness} for stiffness in STRETCH)
         best = self.simpler(form, self.fit(f"{form.name}, cords", *[(*form.rows, row) for row in cords], near=form))
         rigid = _without_times(best.rows)
@@ -139,8 +141,9 @@ class _Search:
         for form in (best, levels):
             best = self.simpler(best, form)
             best = self.simpler(best, self.fit(f"{form.name}, two elements", _doubled(form.rows), near=form))
-        for name, rows in _pruned(best):
-            best = self.simpler(self.fit(name, rows, near=best), best)
+        rigid = tuple(row for row in best.rows if row["effect"] != CORDS)
+        if 2 <= len(rigid) < len(best.rows):  # what came after the cords may have replaced them
+            best = self.simpler(self.fit(f"{best.name}, no cords", rigid, near=best), best)
         return best
 
     def simpler(self, first: Form, second: Form) -> Form:
@@ -226,37 +229,23 @@ def _shared(rows: Rows) -> list[str]:
 
 def _scaled(rows: Rows, factor: float) -> Rows:
     """Return rows with distances, or the inverse of stiffnesses, times a factor."""
-    scaled = []
-    for row in rows:
-        key = "displacement" if "displacement" in row else "stiffness"
-        power = 1.0 if key == "displacement" else -1.0
-        scaled.append({**row, key: row[key] * factor**power} if row["effect"] == PRESLIDING else dict(row))
-    return tuple(scaled)
+    powers = {"displacement": 1.0, "stiffness": -1.0}
+    return _changed(rows, lambda row: {key: row[key] * factor**p for key, p in powers.items() if key in row})
 
 
-def _following(rows: Rows) -> Rows:
-    """Return rows whose friction held is in proportion to the limit."""
-    return tuple({**row, FOLLOWS: 1.0} if row["effect"] == PRESLIDING else dict(row) for row in rows)
+def _changed(rows: Rows, change: Callable[[Row], Row]) -> Rows:
+    """Return rows of the memory with other numbers of their elements."""
+    return tuple({**row, **change(row)} if row["effect"] == PRESLIDING else row for row in rows)
 
 
 def _doubled(rows: Rows) -> Rows:
     """Return two elements in place of each, a stiffer one and a softer one with a share."""
-    doubled: list[dict[str, Any]] = []
-    for row in rows:
-        if row["effect"] != PRESLIDING:
-            doubled.append(row)
-            continue
-        key = "displacement" if "displacement" in row else "stiffness"
-        stiff, soft = (SPLIT, 1.0 / SPLIT) if key == "displacement" else (1.0 / SPLIT, SPLIT)
-        doubled += [{**row, key: stiff * row[key]}, {**row, key: soft * row[key], "share": SHARE}]
-    return tuple(doubled)
-
-
-def _pruned(form: Form) -> list[tuple[str, Rows]]:
-    """Return the form without its cords, which what came after them may have replaced."""
-    if len(form.rows) > 2 and any(row["effect"] == CORDS for row in form.rows):
-        return [(f"{form.name}, no cords", tuple(row for row in form.rows if row["effect"] != CORDS))]
-    return []
+    pairs = zip(_scaled(rows, SPLIT), _scaled(rows, 1.0 / SPLIT), strict=True)
+    return tuple(
+        row
+        for stiff, soft in pairs
+        for row in ([stiff, {**soft, "share": SHARE}] if stiff["effect"] == PRESLIDING else [stiff])
+    )
 
 
 def _without_times(rows: Rows) -> Rows:
