@@ -19,9 +19,10 @@ from tendonfmu.errors import InputError
 from tendonfmu.estimate.fitting import FrictionFit
 from tendonfmu.estimate.learning import posterior_factor
 from tendonfmu.estimate.memory_choice import NEAR, _Search, choose_memory
+from tendonfmu.estimate.memory_methods import STEP, full_problem
 from tendonfmu.estimate.structure import Choice
 from tendonfmu.model import finger_from_data, get_number, moment_arms, set_number
-from tendonfmu.recordings import FitRecording, Held, Recording, best_angles, prepare
+from tendonfmu.recordings import FitRecording, Held, Recording, best_angles, make_grid, prepare
 
 pytestmark = pytest.mark.filterwarnings(
     "ignore::tendonfmu.estimate.fitting.FitWarning", "ignore::tendonfmu.commands.diagnose.DiagnosisWarning"
@@ -182,6 +183,21 @@ def test_a_fit_starts_inside_where_a_number_is_rounded_out_of_its_box() -> None:
     begin = search._numbers_of(estimator, data)
     assert begin[k] == item.lower > 0.0
     estimator.values(begin)  # it accepts them
+
+
+def test_an_initial_bias_is_what_its_joint_leaves() -> None:
+    data, left = finger(RELATIVE), [0.05, -0.03]
+    data["bias"]["initial_torque"] = [0.0, 0.0]
+    made = recording(RELATIVE, duration=10.0)
+    torque = made.groups["external_torque"] - np.array(left)  # y gains as much
+    moved = Recording(made.path, made.time, made.groups | {"external_torque": torque})
+    given = finger_from_data(data, Path("small.json"))
+    recordings = [prepare(given, moved, 3, Held())]
+    structure, estimator = _Search(given, recordings, Choice(), 1)._structure((RELATIVE,))
+    problem = full_problem(structure, estimator, recordings, make_grid(recordings, STEP), 1)
+    found = problem.unknowns_at(problem.state(problem.scale.coordinates(estimator.start)))
+    of = {unknown.path: k for k, unknown in enumerate(estimator.unknowns)}
+    assert [found[of[f"bias.initial_torque[{j}]"]] for j in (1, 2)] == pytest.approx(left, abs=2e-3)
 
 
 # --- the best angles --------------------------------------------------------------------------------------------------

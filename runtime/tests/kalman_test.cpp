@@ -161,4 +161,23 @@ TEST(Kalman, RefusesNumbersThatAreNotFinite) {
   EXPECT_FALSE(filter.update());
 }
 
+// Nothing is uncertain here but the noise, so its variance is the whole of the innovation's.
+TEST(Kalman, RefusesAVarianceThatIsNotPositiveOrNotFinite) {
+  kalman_settings s = some_settings(3, 1, 1);
+  s.drift_variance = 0.0;
+  Model model(s, 29);
+  model.next();
+  const Numbers none(3, 0.0);
+  for (const double noise : {-1e-4, 0.0, 1e-4, HUGE_VAL}) {
+    kalman_filter filter(s, s.scale, 0.0);
+    kalman_sample sample = model.at(s.scale.data());
+    sample.torque_rows = none.data();
+    sample.jump = nullptr;
+    sample.noise = noise;
+    sample.use = true;
+    filter.add(sample);
+    EXPECT_EQ(filter.update(), noise == 1e-4) << noise;
+  }
+}
+
 }  // namespace
