@@ -135,7 +135,7 @@ def test_a_class_is_a_schema(generator: ModuleType, tmp_path: Path) -> None:
         ("keys", lambda t: t["keys"][0]["keys"].remove("tip"), "expected the same in its `keys`"),
         (
             "effects",
-            lambda t: t["effects"][0]["numbers"][0].update(scale=0.0),
+            lambda t: t["effects"][0]["numbers"][0].update(scale=-1.0),
             "and a scale",
         ),
         ("outputs", lambda t: t["units"].pop("Hz"), "no unit 'Hz', which velocity_filter_cutoff has"),

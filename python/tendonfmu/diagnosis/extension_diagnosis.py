@@ -62,10 +62,11 @@ class Verified:
 def merged(causes: Sequence[Judged]) -> list[Judged]:
     """Merge the places of one effect into one cause."""
     by_effect: dict[str, Judged] = {}
-    calibrated = CALIBRATED if any(cause.effect == CALIBRATION for cause in causes) else ()
-    # a single sensor that was found beside several belongs to them
-    for cause in sorted(causes, key=lambda cause: cause.effect != CALIBRATION) if calibrated else causes:
-        effect = CALIBRATION if cause.effect in calibrated else cause.effect
+    several = max((cause.gain.value for cause in causes if cause.effect == CALIBRATION), default=np.inf)
+    # a single sensor that was found beside several belongs to them, unless it explains more than they do
+    for cause in sorted(causes, key=lambda cause: cause.effect != CALIBRATION) if several < np.inf else causes:
+        belongs = cause.effect in CALIBRATED and cause.gain.value <= several < np.inf
+        effect = CALIBRATION if belongs else cause.effect
         known = by_effect.setdefault(effect, cause)
         if known is not cause:
             both = zip(known.where.place, cause.where.place, strict=True)

@@ -115,9 +115,14 @@ def calibration(view: View, selection: Selection, tried: Collection[str], least_
 
 
 def is_better(together: Judged, single: Judged | None, least_gain: float) -> bool:
-    """Return whether all corrections together are materially and certainly better than the best single effect."""
+    """Return whether all corrections together are materially and certainly better than the best single effect.
+
+    A single sensor that explains nearly as much is named by itself.
+    """
     if single is None:
         return True
+    if single.effect in CALIBRATED and single.gain.value >= NEARLY * together.gain.value:
+        return False
     gain, error = rms_gain(single.unseen, together.unseen)
     return gain >= least_gain and gain > CERTAIN * error
 
