@@ -18,6 +18,8 @@ const effect_action cord_stretch_action = {.kind = EFFECT_MEMORY};
 /* numbers of a row of presliding, as in effects.json */
 enum { DISPLACEMENT, STIFFNESS, RELAXATION_TIME, SHARE, FOLLOWS_LIMIT };
 
+static const double none[EFFECT_MAX_PARAMETERS]; /* of an element that is not there: its share is 0 */
+
 /* how specific a row of presliding is at a slot; 0: it does not act there */
 static int rank_at(const tendonfmu_finger* f, effect_place place, size_t slot) {
   const size_t lanes = f->tendon_lanes, joint_row = f->joints * lanes;
@@ -83,13 +85,11 @@ static void find_elements(tendonfmu_finger* f, size_t slot) {
     }
   }
   f->memory.remembers[slot] = found ? 1.0 : 0.0;
-  for (size_t e = 0; e < elements_of(f); ++e) {
-    const friction_element* to = &f->memory.element[e];
-    to->share[slot] = e < found ? to->share[slot] / sum : 0.0;
-    to->stiffness[slot] = e < found ? to->stiffness[slot] : 0.0;
-    to->per_distance[slot] = e < found ? to->per_distance[slot] : 1.0;
-    to->relaxation_time[slot] = e < found ? to->relaxation_time[slot] : 0.0;
-    to->follows[slot] = e < found ? to->follows[slot] : 0.0;
+  for (size_t e = 0; e < found; ++e) {
+    f->memory.element[e].share[slot] /= sum;
+  }
+  for (size_t e = found; e < elements_of(f); ++e) {
+    set_element(f, e, slot, (effect_place){EFFECT_NOWHERE, EFFECT_NOWHERE, EFFECT_NOWHERE}, none);
   }
 }
 

@@ -313,7 +313,7 @@ def not_taken(causes: Iterable[Cause], experiments: Mapping[Where, str], seconds
     for cause in causes:
         if cause.gain.low > 0.0:
             small.append(cause)
-        elif cause.p_value < SIGNIFICANCE:
+        elif cause.p_value < SIGNIFICANCE and not cause.gain.high < 0.0:  # else unseen data refute it
             settling = _longer(cause.gain, seconds) or experiments.get(cause.where) or OTHER_MOTION
             uncertain.append(replace(cause, experiment=settling))
     return {"too_small": tuple(small), "uncertain": tuple(uncertain)}

@@ -175,16 +175,6 @@ HOT_INLINE quad loss_of_memory(tendonfmu_finger* f, size_t slot, size_t row, qua
   return step_places(f, &p);
 }
 
-/* At places that have no memory. */
-HOT_INLINE void remember_nothing(const tendonfmu_finger* f, size_t at) {
-  for (size_t e = 0; e < elements_of(f); ++e) {
-    quad_store(f->scratch.element + e * 2 * f->slots + at, quad_set(0.0));
-  }
-  quad_store(f->scratch.by_turning + at, quad_set(0.0));
-  quad_store(f->scratch.by_limit + at, quad_set(0.0));
-  quad_store(f->scratch.held_limit + at, quad_set(0.0));
-}
-
 /* The same of the joints' own friction. */
 HOT_INLINE quad torque_of_memory(tendonfmu_finger* f, size_t joint, quad limit) {
   return step_rigid(f, f->joints * f->tendon_lanes + joint, EDGES, limit);
