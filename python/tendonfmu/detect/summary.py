@@ -204,7 +204,7 @@ def summarise(score: DetectionScore, seed: int = 0) -> Figures:
     held, rms = sum(event.held for event in found), _free_rms(score.free, seed)
     delays = {name: Estimate.of(intervals.quantile(score.delays, part, seed)) for name, part in QUARTILES.items()}
     contact = None if contact is None or not len(contact.samples) else contact
-    errors = None if contact is None else _contact_error(contact, seed)
+    errors = None if contact is None else _of_sums([contact.samples, contact.errors], _root_mean, seed)
     return Figures(
         events=len(score.events),
         found=len(found),
@@ -291,10 +291,6 @@ def _ratio(sums: Numbers) -> Numbers:
 def _root_mean(sums: Numbers) -> Numbers:
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.asarray(np.sqrt(sums[:, 1:] / sums[:, :1]))
-
-
-def _contact_error(sums: ContactSums, seed: int) -> list[Estimate]:
-    return _of_sums([sums.samples, sums.errors], _root_mean, seed)
 
 
 def _by_regression(sums: ContactSums, which: int, seed: int) -> list[Estimate]:

@@ -134,8 +134,8 @@ class _Search:
         form = self.simpler(form, self.fit(f"{form.name}, by limit", following, near=form))
         cords = ({"effect": CORDS, "stiffness": stiffness} for stiffness in STRETCH)
         best = self.simpler(form, self.fit(f"{form.name}, cords", *[(*form.rows, row) for row in cords], near=form))
-        rigid = _without_times(best.rows)
-        starts = [_scaled(rigid, factor) for factor in LONGER]
+        lasting = tuple({key: value for key, value in row.items() if key != "relaxation_time"} for row in best.rows)
+        starts = [_scaled(lasting, factor) for factor in LONGER]
         best = self.simpler(self.fit(f"{best.name}, no relaxation", *starts, near=best), best)
         whole, levels = best, self.fit(f"{best.name}, levels", _by_level(data, best.rows), near=best)
         for form in (whole, levels):
@@ -249,10 +249,6 @@ def _doubled(rows: Rows) -> Rows:
         for stiff, soft in pairs
         for row in ([stiff, {**soft, "share": SHARE}] if stiff["effect"] == PRESLIDING else [stiff])
     )
-
-
-def _without_times(rows: Rows) -> Rows:
-    return tuple({key: value for key, value in row.items() if key != "relaxation_time"} for row in rows)
 
 
 def _friction(data: Data) -> float:

@@ -409,7 +409,7 @@ class _Recipe:
         if kind == "any":
             return draws.direction()
         sign = draws.sign()
-        across = _unit(_cross(segment.axis, segment.end)) if kind == "pad" else _unit(segment.axis)
+        across = _unit(np.cross(segment.axis, segment.end).tolist()) if kind == "pad" else _unit(segment.axis)
         if across is None:
             what = "physics.tip" if segment.link == self.segments[-1].link else "a link's length"
             self.node.member("direction").refuse(f'"any" or "side": no pad, since {what} is zero or along the axis')
@@ -422,10 +422,6 @@ def _directions(node: Node) -> list[str]:
         return ["any"]
     kinds = node.elements() if isinstance(node.value, list) and node.value else [node]
     return [kind.choice("any", "pad", "side") for kind in kinds]
-
-
-def _cross(a: Vector, b: Vector) -> Vector:
-    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
 def _unit(vector: Vector) -> Vector | None:
