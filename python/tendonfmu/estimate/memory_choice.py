@@ -137,13 +137,12 @@ class _Search:
         lasting = tuple({key: value for key, value in row.items() if key != "relaxation_time"} for row in best.rows)
         starts = [_scaled(lasting, factor) for factor in LONGER]
         best = self.simpler(self.fit(f"{best.name}, no relaxation", *starts, near=best), best)
-        whole, levels = best, self.fit(f"{best.name}, levels", _by_level(data, best.rows), near=best)
-        for form in (whole, levels):
-            best = self.simpler(best, form)
-            best = self.simpler(best, self.fit(f"{form.name}, two elements", _doubled(form.rows), near=form))
-        split = _by_level(data, best.rows)
-        if best is not whole and split != best.rows:  # levels may differ in both elements only
-            best = self.simpler(best, self.fit(f"{best.name}, levels", split, near=best))
+        whole = best
+        best = self.simpler(best, self.fit(f"{best.name}, levels", _by_level(data, best.rows), near=best))
+        single = best
+        best = self.simpler(best, self.fit(f"{best.name}, two elements", _doubled(best.rows), near=best))
+        if best is not single is whole:  # levels may differ in both elements only
+            best = self.simpler(best, self.fit(f"{best.name}, levels", _by_level(data, best.rows), near=best))
         rigid = tuple(row for row in best.rows if row["effect"] != CORDS)
         if 2 <= len(rigid) < len(best.rows):  # what came after the cords may have replaced them
             best = self.simpler(self.fit(f"{best.name}, no cords", rigid, near=best), best)
