@@ -128,10 +128,16 @@ class _Search:
         return with_values(structure, estimator.values(problem.unknowns_at(found.state)))
 
     def grown(self, form: Form) -> Form:
+        """Return a form with the parts that make it clearly better; friction held may follow the limit."""
+        by_limit = _changed(form.rows, lambda _: {FOLLOWS: 1.0})
+        following = self.fit(f"{form.name}, by limit", by_limit, near=form)
+        if not following.is_better_than(form):
+            return self._with_parts(form)
+        return self.simpler(self._with_parts(following), self._with_parts(form))
+
+    def _with_parts(self, form: Form) -> Form:
         """Return a form with the parts that make it clearly better, and without those that do not."""
         data = self._finger.data
-        following = _changed(form.rows, lambda _: {FOLLOWS: 1.0})
-        form = self.simpler(form, self.fit(f"{form.name}, by limit", following, near=form))
         cords = ({"effect": CORDS, "stiffness": stiffness} for stiffness in STRETCH)
         best = self.simpler(form, self.fit(f"{form.name}, cords", *[(*form.rows, row) for row in cords], near=form))
         lasting = tuple({key: value for key, value in row.items() if key != "relaxation_time"} for row in best.rows)
