@@ -119,6 +119,7 @@ def _where(where: found.Where) -> dict[str, Any]:
 
 
 def _cause(cause: found.Cause, kind: str) -> dict[str, Any]:
+    sensors = [_where(sensor.where) | _fields(sensor, "correction", "unit") for sensor in cause.sensors]
     return {
         **_where(cause.where),
         **_fields(cause, "p_value", "gain", "gain_unit"),
@@ -128,13 +129,9 @@ def _cause(cause: found.Cause, kind: str) -> dict[str, Any]:
         "places": [
             _fields(place, "joint", "tendon") | _numbers_of(place.parameters, cause.intervals) for place in cause.places
         ],
-        **({"sensors": [_sensor(sensor) for sensor in cause.sensors]} if cause.sensors else {}),
+        **({"sensors": sensors} if sensors else {}),
         **_fields(cause, "size", "title", "explanation", "evidence"),
     }
-
-
-def _sensor(sensor: found.Sensor) -> dict[str, Any]:
-    return _where(sensor.where) | _fields(sensor, "correction", "unit")
 
 
 def _changed(changed: found.ChangedSize | None) -> dict[str, Any]:

@@ -270,13 +270,9 @@ def _caption(drawn: Sequence[Effect]) -> str:
     text = "Share of the tendon force that is lost, over the tendon's velocity."
     if any(effect.angles for effect in drawn):
         text += " Laws with working points: over the angle of the joint before, at the training's median speed"
-        text += ", and at v_min where sliding begins." if any(map(_is_plain, drawn)) else "."
+        plain = any(effect.angles and not asymmetric(effect) for effect in drawn)  # one side for both directions
+        text += ", and at v_min where sliding begins." if plain else "."
     return text
-
-
-def _is_plain(effect: Effect) -> bool:
-    """Say whether a law has working points and one side for both directions."""
-    return bool(effect.angles) and not asymmetric(effect)
 
 
 def is_known(effect: Effect, picture: FitPicture) -> bool:

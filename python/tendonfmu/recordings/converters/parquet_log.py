@@ -47,7 +47,8 @@ class ParquetLog:
         for place, column in enumerate(schema):
             values = None if first is None or not first.num_rows else first.column(place)
             for name, path, kind in _leaves(column.name, (), column.type, values):
-                fields.append(Field(name, _kind(kind), str(kind), _unit(column) or _unit_of_duration(kind)))
+                of_duration = str(kind.unit) if pa.types.is_duration(kind) else ""
+                fields.append(Field(name, _kind(kind), str(kind), _unit(column) or of_duration))
                 self._paths[f"{NUMBERED}{len(fields)}"] = self._paths[name] = place, path
         self.topics = [Topic("", tuple(fields), rows)]
 
@@ -131,10 +132,6 @@ def _leaves(name: str, path: tuple[str | int, ...], kind: Any, values: Any) -> I
         return
     for k in range(length):
         yield from _leaves(f"{name}[{k + 1}]", (*path, k), kind.value_type, pc.list_element(values, k))
-
-
-def _unit_of_duration(kind: Any) -> str:
-    return str(kind.unit) if pa.types.is_duration(kind) else ""
 
 
 def opened(file: Path) -> Any:
