@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -10,15 +11,17 @@ import pytest
 from numpy.typing import NDArray
 
 from made_columns import UNSEEN, Made, candidate_columns, coloured, grams_of, waves
+from tendonfmu.diagnosis.answer import not_taken
 from tendonfmu.diagnosis.candidate_columns import hypotheses
 from tendonfmu.diagnosis.effects import BY_NAME, Place, Term, Where
 from tendonfmu.diagnosis.extension_diagnosis import merged
 from tendonfmu.diagnosis.extension_fit import extended_description
-from tendonfmu.diagnosis.result import CausePlace
+from tendonfmu.diagnosis.result import Cause, CausePlace, with_error
 from tendonfmu.diagnosis.samples import as_described, corrected_arms
 from tendonfmu.diagnosis.search import PLAUSIBLE, Trial, beside_calibration, calibrated, calibration, is_better
 from tendonfmu.diagnosis.selection import Judged, Selection
 from tendonfmu.diagnosis.view import View
+from tendonfmu.statistics import Interval
 
 Numbers = NDArray[np.float64]
 
@@ -134,3 +137,22 @@ def test_it_is_folded_back_into_the_description() -> None:
     assert len(found["places"]) == 9 and sum(len(place.parameters) for place in found["places"]) == 9
     assert found["sensors"][-1].words == ("forces", "2\u00a0ms later than positions")
     assert "more" in found["size"] and "tendon" in found["size"]
+
+
+def test_a_sensor_that_explains_nearly_all_keeps_its_name_beside_better_corrections() -> None:
+    together, single = judged(ONE)
+    assert together is not None and single is not None
+    surer = replace(together, unseen=0.5 * single.unseen)  # certainly better
+    assert not is_better(replace(surer, gain=with_error(single.gain.value / 0.9, 0.0)), single, LEAST_GAIN)
+    assert is_better(replace(surer, gain=with_error(single.gain.value / 0.7, 0.0)), single, LEAST_GAIN)
+    small = replace(together, gain=with_error(0.5 * single.gain.value, 0.0))
+    large = replace(together, gain=with_error(2.0 * single.gain.value, 0.0))
+    assert {cause.effect for cause in merged([single, small])} == {"force_gain", "calibration"}
+    assert {cause.effect for cause in merged([single, large])} == {"calibration"}
+
+
+def test_what_unseen_data_refute_is_not_uncertain() -> None:
+    refuted = Cause(Where("inertia"), gain=Interval(-0.05, -0.08, -0.02), p_value=1e-6)
+    open_ = replace(refuted, gain=Interval(0.02, -0.03, 0.07))
+    assert not_taken([refuted, open_], {}, 60.0)["uncertain"][0].gain == open_.gain
+    assert len(not_taken([refuted, open_], {}, 60.0)["uncertain"]) == 1

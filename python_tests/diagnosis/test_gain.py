@@ -273,3 +273,11 @@ def test_a_gain_has_no_unit_and_no_first_stretch() -> None:
     assert gain_of(left + made, left, 3 * stretch) == pytest.approx(one, rel=1e-12)  # stretches between are not used
     order = np.random.default_rng(1).permutation(len(left))
     assert gain_of((left + made)[order], left[order], stretch[order]) == pytest.approx(one, rel=1e-9)
+
+
+def test_one_block_that_holds_most_of_what_is_left_does_not_hide_a_gain() -> None:
+    rng = np.random.default_rng(3)
+    before, after = rng.uniform(0.8, 1.2, 29), 0.005 * rng.uniform(0.8, 1.2, 29)
+    before[6], after[6] = 1.0, 0.3
+    found = gain_interval(before, after)
+    assert 0.1 < found.low < found.value < found.high
