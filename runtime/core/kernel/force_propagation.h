@@ -183,7 +183,11 @@ HOT_INLINE quad loss_at(tendonfmu_finger* f, size_t slot, size_t row, const doub
   if (!elements_of(f)) {
     return loss;
   }
-  return quad_select(slides_at(f, slot), loss_of_memory(f, slot, row, value, acting, before), loss);
+  const quad_mask slides = slides_at(f, slot);
+  if (!quad_bits(slides)) {
+    return loss;
+  }
+  return quad_select(slides, loss_of_memory(f, slot, row, value, acting, before), loss);
 }
 
 /* f_A and f_B along some tendons from i on, as a recursion, and what they make at each joint: the sums over the tendons
