@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import re
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -168,8 +169,19 @@ def test_the_form_is_chosen_by_what_is_left_out(truth: Rows, name: str) -> None:
     assert errors[choice.form.name] <= errors["none"]
     # with its parts the second one may be the better of two that are near
     whole = {form: errors[form] for form in ("relative", "absolute")}
-    grown = {form.partition(",")[0] for form in errors if "," in form}
+    grown = {form.partition(",")[0] for form in errors if "," in form.replace(", filtered", "", 1)}
     assert grown == {form for form in whole if whole[form] < NEAR * min(whole.values())}
+
+
+@pytest.mark.parametrize("noise", [0.0, 1.5e-3])  # rad; joints slip after 3 mrad
+def test_noise_of_the_angles_decides_whether_the_travel_is_filtered(noise: float) -> None:
+    given, made = finger_from_data(finger(start=True), Path("small.json")), recording(RELATIVE)
+    angle = made.groups["joint_position"]
+    angle = angle + noise * np.random.default_rng(5).standard_normal(angle.shape)
+    noisy = replace(made, groups={**made.groups, "joint_position": angle})
+    choice = choose_memory(given, [prepare(given, noisy, 2, Held())], Choice(share=["tendons"]))
+    rows = [row for row in choice.finger.data["extensions"] if row["effect"] == "presliding"]
+    assert rows and all(row.get("filtered_travel", 0.0) == (noise > 0.0) for row in rows)
 
 
 def test_a_fit_starts_inside_where_a_number_is_rounded_out_of_its_box() -> None:

@@ -234,7 +234,7 @@ def test_numbers_of_extensions_are_those_of_the_runtime() -> None:
     assert list(listed.items()) == [(path, value) for path, value in known.items() if path in listed]
     # turns, reaction, and beyond twice: of the mechanism, and not given; and what six rows of presliding do not have
     # or choose
-    assert len(known) - len(listed) == 4 + 3 * 3 + 2 + 3 + 2 + 6
+    assert len(known) - len(listed) == 4 + 3 * 3 + 2 + 3 + 2 + 6 * 2
 
 
 @pytest.mark.parametrize(

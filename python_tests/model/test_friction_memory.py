@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from runners import product
 
@@ -141,6 +142,18 @@ def test_what_is_held_decays_at_rest() -> None:
     time = np.arange(1100) * 1e-3
     torque = of_joint(rows, time, np.where(time < 0.1, 0.3, 0.0))
     np.testing.assert_allclose(torque[1099], torque[99] * np.exp(-1.0 / 0.5), rtol=1e-9)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
+def test_the_travel_is_that_of_the_filtered_velocity_as_far_as_it_is_told(share: float) -> None:
+    rows = [{"effect": "presliding", "joint": 1, "stiffness": 0.5, "filtered_travel": share}]
+    time = np.arange(200) * 2e-3
+    angle = 0.01 * np.sin(20.0 * time)
+    recording = {"time": time, "tendon_force": np.full((200, 1), 10.0), "joint_position": angle[:, None]}
+    out = product("model.native").Instance.from_description(joint(rows), 2).run(recording)
+    late = lfilter([gain := -np.expm1(-2.0 * np.pi * 20.0 * 2e-3)], [1.0, gain - 1.0], angle)
+    held = 0.5 * (share * late + (1.0 - share) * angle)
+    np.testing.assert_allclose((out["friction_torque"] - out["bias_torque"])[:, 0], held, rtol=1e-9, atol=1e-12)
 
 
 def test_the_most_specific_rows_hold() -> None:

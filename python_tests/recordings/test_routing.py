@@ -267,6 +267,23 @@ def test_redundant_tendons_show_their_stiffness() -> None:
     assert len(covered) == 30 and np.mean(covered) >= 0.85
 
 
+def test_redundant_tendons_are_corrected_together() -> None:
+    """They stand in one equation: where one is off, smaller differences of the others count, too."""
+    finger, recording = made_up(0)
+    recording.groups.pop("joint_position")
+
+    def moved(*factors: float) -> list[int]:
+        tendons = [
+            {**tendon, "stiffness": factor * tendon["stiffness"]}
+            for tendon, factor in zip(finger.data["tendons"], factors, strict=True)
+        ]
+        learned = learn_routing(finger.with_data({**finger.data, "tendons": tendons}), [recording])
+        return [each.tendon for each in learned if each.stiffness.differs]
+
+    assert moved(1.08, 0.98, 1.0) == [0, 1]
+    assert moved(1.02, 0.98, 1.0) == []
+
+
 def test_a_calibration_begins_with_the_routing(tmp_path: Path, index: tuple[Finger, Recording]) -> None:
     given, free = tmp_path / "given.json", tmp_path / "free.parquet"
     given.write_text(json.dumps(dict(changed(index[0], arms=0.2, stiffness=0.5).data)), encoding="utf-8")

@@ -112,7 +112,8 @@ class FingerOracle:
         # 1. kinematics
         q, v = self._kinematics(inputs, f0, dt, first, out)
         x_dot = tendon_velocity(self.R, v)
-        travel = v * dt if self.source == 3 else q - (q if first else self.q + self.shift)
+        filtered = 1.0 if self.source == 3 else self.elements.filtered
+        travel = filtered * v * dt + (1.0 - filtered) * (q - (q if first else self.q + self.shift))
         self.travelled = travel, tendon_velocity(self.R, travel)
         self.extensions.advance(q, v, x_dot, f0, dt, first, self.thresholds, self.travelled, self.elements, out)
         self.elements.turn(self.travelled, dt, first)

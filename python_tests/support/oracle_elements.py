@@ -73,6 +73,7 @@ class Elements:
         extensions = given(description, "extensions", [])
         self.rows = [row for row in extensions if row["effect"] == "presliding"]
         stretch = [float(row["stiffness"]) for row in extensions if row["effect"] == "cord_stretch"]
+        self.filtered = max((float(given(row, "filtered_travel", 0.0)) for row in self.rows), default=0.0)
         self.compliance = 1.0 / stretch[0] if stretch and self.rows else 0.0
         self.R, self.thresholds, self.branches = R, thresholds, branches
         self.forces: dict[Place, list[float]] = {}  # F of each element

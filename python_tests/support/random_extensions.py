@@ -63,6 +63,8 @@ def presliding(rng: np.random.Generator, n: int, m: int, j: int, i: int) -> Row:
         row["relaxation_time"] = float(10.0 ** rng.uniform(-2.0, 1.0))
     if rng.random() < 0.4:
         row["follows_limit"] = float(rng.choice([1.0, rng.uniform(0.0, 1.0)]))
+    if rng.random() < 0.2:
+        row["filtered_travel"] = float(rng.choice([1.0, rng.uniform(0.0, 1.0)]))
     return row | ({"share": rng.uniform(0.2, 2.0)} if rng.random() < 0.3 else {})
 
 

@@ -80,11 +80,12 @@ static void input_direction(const tendonfmu_finger* f, const tendonfmu_inputs* d
 static void linearise_kinematics(linearisation* l, const signal_derivative* d) {
   const finger_state* s = &l->finger->remembered;
   const int given = source_of(l->finger) == TENDONFMU_JOINT_VELOCITIES;
+  const double filtered = filtered_travel(l->finger);
   for (size_t j = 0; j < l->finger->joints; ++j) {
     const double speed = given ? d->velocity[j] : s->scalar[STATE_VELOCITY_GAIN] * d->angle[j];
     l->angle[j] = (dual){s->angle[j], d->angle[j]};
     l->speed[j] = (dual){s->speed[j], speed};
-    l->motion[j] = given ? s->scalar[STATE_STEP] * speed : d->angle[j];
+    l->motion[j] = filtered * s->scalar[STATE_STEP] * speed + (1.0 - filtered) * d->angle[j];
   }
 }
 

@@ -63,6 +63,7 @@ typedef struct friction_memory {
   double stretch;    /* the same in the present step: 0 in the first */
   int relaxes;       /* some place has a relaxation time */
   int follows;       /* at some place p > 0 */
+  double filtered;   /* share of the travel that comes from the filtered velocity */
   double step;       /* that kept, stiff, soft are of, s */
   double* remembers; /* [n × M + N] 1 or 0 */
   double* sections;  /* [n × M + N] S, of the cord from a level to the tendon's end */
@@ -350,6 +351,11 @@ static inline void clear_lanes(double* row, size_t lanes) {
 /* Where joint angles and velocities come from: TENDONFMU_TENDON_POSITIONS, … */
 static inline int source_of(const tendonfmu_finger* finger) {
   return (int)finger->remembered.scalar[STATE_SOURCE];
+}
+
+/* Share of the travel that comes from the velocity, filtered or measured; the rest is how the angle changed. */
+static inline double filtered_travel(const tendonfmu_finger* finger) {
+  return source_of(finger) == TENDONFMU_JOINT_VELOCITIES ? 1.0 : finger->memory.filtered;
 }
 
 static inline int uses_positions(const tendonfmu_finger* finger) {

@@ -2,6 +2,7 @@
 
 #include "extensions.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "effect_facts.h"
@@ -16,7 +17,7 @@ const effect_action cord_stretch_action = {.kind = EFFECT_MEMORY};
 #define STEEPEST       1e290  /* 1/m, 1/rad, of z */
 
 /* numbers of a row of presliding, as in effects.json */
-enum { DISPLACEMENT, STIFFNESS, RELAXATION_TIME, SHARE, FOLLOWS_LIMIT };
+enum { DISPLACEMENT, STIFFNESS, RELAXATION_TIME, SHARE, FOLLOWS_LIMIT, FILTERED_TRAVEL };
 
 static const double none[EFFECT_MAX_PARAMETERS]; /* of an element that is not there: its share is 0 */
 
@@ -63,6 +64,7 @@ static void set_element(tendonfmu_finger* f, size_t e, size_t slot, effect_place
   to->follows[slot] = numbers[FOLLOWS_LIMIT];
   f->memory.relaxes |= numbers[RELAXATION_TIME] > 0.0;
   f->memory.follows |= numbers[FOLLOWS_LIMIT] > 0.0;
+  f->memory.filtered = fmax(f->memory.filtered, numbers[FILTERED_TRAVEL]);
 }
 
 /* the rows that hold at a slot, at most two; none where the tendon moves no joint from there on */
@@ -143,6 +145,7 @@ static void find_decay(tendonfmu_finger* f, double step) {
 
 void find_memory(tendonfmu_finger* f) {
   f->memory.relaxes = f->memory.follows = 0;
+  f->memory.filtered = 0.0;
   if (!elements_of(f)) {
     return;
   }
@@ -156,10 +159,12 @@ void find_memory(tendonfmu_finger* f) {
 
 void turn_places(tendonfmu_finger* f, double step) {
   const finger_scratch* s = &f->scratch;
-  const int first = is_first(f), given = source_of(f) == TENDONFMU_JOINT_VELOCITIES;
+  const int first = is_first(f);
+  const double filtered = filtered_travel(f);
   const size_t joint_row = f->joints * f->tendon_lanes;
   for (size_t j = 0; j < f->joint_lanes; ++j) {
-    const double travel = given ? s->velocity[joint_row + j] * step : s->angle[j] - angle_before_step(f, j);
+    const double raw = s->angle[j] - angle_before_step(f, j);
+    const double travel = filtered * s->velocity[joint_row + j] * step + (1.0 - filtered) * raw;
     s->travelled[joint_row + j] = first ? 0.0 : travel;
     s->own_limit[j] = 0.0;
   }

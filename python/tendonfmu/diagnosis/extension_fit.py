@@ -21,6 +21,7 @@ from tendonfmu.diagnosis.effects.terms import changed_law
 from tendonfmu.diagnosis.result import with_error
 from tendonfmu.diagnosis.samples import Samples
 from tendonfmu.estimate import (
+    CHOSEN,
     Choice,
     Estimator,
     MemoryProblem,
@@ -111,7 +112,7 @@ def _term(name: str, rows: tuple[Row, ...]) -> MemoryTerm:
 def _form(row: Row) -> tuple[Any, ...]:
     """Return what a row is about, whatever its numbers are."""
     place = tuple(row.get(key) for key in ("joint", "tendon", "level"))
-    return place, "displacement" in row, "share" in row, bool(row.get("follows_limit"))
+    return place, "displacement" in row, "share" in row, *(bool(row.get(key)) for key in CHOSEN)
 
 
 # --- all numbers ------------------------------------------------------------------------------------------------------

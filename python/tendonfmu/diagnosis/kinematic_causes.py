@@ -238,7 +238,8 @@ def _listed(data: Data, learned: Sequence[TendonRouting], is_change: bool) -> It
             yield Off(Where(effect, j + 1, i + 1), arm, least)
         zero, force = _zero(each, is_change)
         spring = each.stiffness
-        yield Off(Where(SPRING, None, i + 1), spring, LEAST_SHARE[SPRING] * spring.described, force)
+        least = spring.material if each.seen_from else LEAST_SHARE[SPRING] * spring.described
+        yield Off(Where(SPRING, None, i + 1), spring, least, force)
         yield Off(Where(ZERO, None, i + 1), zero, LEAST_ANGLE * largest)
 
 

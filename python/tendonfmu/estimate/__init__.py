@@ -48,7 +48,7 @@ if TYPE_CHECKING:
         settings_of,
         unknown_names,
     )
-    from .memory import has_memory, without_memory
+    from .memory import CHOSEN, has_memory, without_memory
     from .memory_choice import choose_memory, encoder_advice
     from .memory_fit import MemoryProblem, minimise
     from .memory_methods import guess_prior

@@ -14,6 +14,7 @@ from tendonfmu.arrays import Data
 from tendonfmu.model import extension_rows, get_number, own_copy, steps_of
 
 PRESLIDING, CORDS = "presliding", "cord_stretch"
+CHOSEN = FOLLOWS, FILTERED = "follows_limit", "filtered_travel"  # numbers of presliding that no fit moves
 TIMES = (1.0, 0.005)  # s, of a relaxation: cables creep for seconds, contacts of a soft constraint for milliseconds
 APART = 10.0  # ratio of the distances, or stiffnesses, that a fit starts from
 STRETCH = 2e4, 2e5  # N/m, cords to start from: 20 N stretch them by 1 mm, or by 0.1 mm

@@ -21,7 +21,10 @@ from tendonfmu.estimate.estimation import Estimator
 from tendonfmu.estimate.fit_report import MemoryEntry
 from tendonfmu.estimate.learning import Learned, Settings, Watch, unknown_names
 from tendonfmu.estimate.memory import (
+    CHOSEN,
     CORDS,
+    FILTERED,
+    FOLLOWS,
     PRESLIDING,
     STRETCH,
     memory_rows,
@@ -47,7 +50,7 @@ DISTANCE = 2e-4  # m, to start from: what a cord on a pulley moves before it sli
 STEPS, TOLERANCE = 12, 0.3
 TIME = 0.1  # s, between the starts of `memory`
 SPLIT, SHARE = 0.4, 0.8  # ratio of a doubled element's numbers to the single one's, and share of the softer one
-FOLLOWS = "follows_limit"
+QUIETER = 0.98  # of the squared error, with the travel of the filtered velocity: it comes late
 TYPICAL = 0.03  # friction of a place
 LONGER = 1.0, 30.0  # times the distance: relaxation within a sample imitates friction without any
 
@@ -85,7 +88,7 @@ def choose_memory(
     search = _Search(finger, recordings, choice or Choice(), threads)
     plain = search.fit("none", ())
     force = float(np.mean([recording.mean_force for recording in recordings]))
-    forms = [search.fit(name, rows) for name, rows in _whole_forms(finger.data, force)]
+    forms = [search.whole(name, rows) for name, rows in _whole_forms(finger.data, force)]
     least = min(form.errors.sum() for form in forms)
     grown = [search.grown(form) for form in forms if form.errors.sum() < NEAR * least]
     best = min(grown, key=lambda form: form.errors.sum())
@@ -117,6 +120,14 @@ class _Search:
         form = Form(name, memory, fitted, held_out_errors(problem, found, self._variance), len(found.state.u))
         self.tried.append(form)
         return form
+
+    def whole(self, name: str, rows: Rows) -> Form:
+        """Fit a form with the travel of the angles, and with that of the filtered velocity; return the better one."""
+        form = self.fit(name, rows)
+        if any(recording.kinematics == 3 for recording in self._recordings):
+            return form
+        other = self.fit(f"{name}, filtered", _changed(rows, lambda _: {FILTERED: 1.0}), near=form)
+        return other if other.errors.sum() < QUIETER * form.errors.sum() else form
 
     def refined(self, form: Form) -> Finger:
         """Return the finger with a form that is fitted to all samples."""
@@ -220,7 +231,7 @@ def _by_level(data: Data, rows: Rows) -> Rows:
         if row["effect"] != PRESLIDING or {"joint", "level"} & set(row):
             split.append(row)
             continue
-        others: dict[str, Any] = {name: row[name] for name in ("relaxation_time", "share", FOLLOWS) if name in row}
+        others: dict[str, Any] = {name: row[name] for name in ("relaxation_time", "share", *CHOSEN) if name in row}
         if "displacement" in row:
             at = [row["displacement"] * number_of(data, f"velocity_threshold.{which}") for which in ("tendon", "joint")]
             split += _rows_of_places(data, "displacement", at[0], [at[1]] * len(data["joints"]), others)

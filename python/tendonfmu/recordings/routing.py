@@ -37,7 +37,7 @@ FEWEST_BLOCKS = 8
 SPEED_CUTOFF = 10.0  # Hz, of the speeds
 SLACK = 0.02  # of a tendon's largest force: below, it does not follow its joints
 CERTAIN = 1.5  # halves of an interval; many numbers are compared
-SEEN_APART = 0.05  # of a stiffness that only other tendons show: its interval, and what differs
+SEEN_APART, APART = 0.05, 0.03  # of a stiffness that only other tendons show: its interval, and what differs
 NORMAL = 1.96  # standard deviations of half an interval
 KNOWN = 0.3  # of a number; one with a wider interval is not determined
 OTHER = 0.002, 0.01, 1e-3  # by which an arm, a stiffness (of the number) and an angle (rad) differ from the described
@@ -173,9 +173,13 @@ def _of_redundancy(finger: Finger, sides: Sequence[Sequence[Recording]]) -> list
             zero = replace(learned.zero, is_known=learned.zero.is_known and not is_alone)
             stiffness = learned.stiffness
             is_known = stiffness.is_known and stiffness.half < SEEN_APART * stiffness.value
-            stiffness = replace(stiffness, is_known=is_known, material=SEEN_APART * stiffness.described)
+            stiffness = replace(stiffness, is_known=is_known)
             found.append(replace(learned, arms=arms_of, stiffness=stiffness, zero=zero, varying={}, seen_from=base))
-    return found
+    # All tendons stand in one equation. If one is off, the others count, too, where they are off by less.
+    apart = [replace(each.stiffness, material=APART * each.stiffness.described) for each in found]
+    if any(stiffness.differs for stiffness in apart):
+        return found
+    return [replace(each, stiffness=stiffness) for each, stiffness in zip(found, apart, strict=True)]
 
 
 def _seen(recording: Recording, base: list[int], zeros: Numbers, arm: Numbers | float) -> Recording:

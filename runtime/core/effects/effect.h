@@ -12,7 +12,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum { EFFECT_MAX_PARAMETERS = 5 };
+enum { EFFECT_MAX_PARAMETERS = 6 };
 
 /* The effects that are linked, a bit each by its id: all, unless a program's build says which its fingers have. */
 #ifndef TENDONFMU_EFFECTS

@@ -18,7 +18,7 @@ static const effect_parameter force_offset_numbers[] = {{.name = "correction", .
 static const effect_parameter moment_arm_numbers[] = {{.name = "correction", .unit = "m", .minimum = -1000000000.0, .maximum = 1000000000.0}};
 static const effect_parameter moment_arm_variation_numbers[] = {{.name = "slope", .unit = "m/rad", .minimum = -1000000000.0, .maximum = 1000000000.0}, {.name = "correction", .unit = "m", .minimum = -1000000000.0, .maximum = 1000000000.0}};
 static const effect_parameter pulley_eccentricity_numbers[] = {{.name = "sine", .unit = "m", .minimum = -1000000000.0, .maximum = 1000000000.0}, {.name = "cosine", .unit = "m", .minimum = -1000000000.0, .maximum = 1000000000.0}, {.name = "turns", .unit = "1", .minimum = 0.0, .maximum = 1000.0}};
-static const effect_parameter presliding_numbers[] = {{.name = "displacement", .unit = "m", .unit_at_joint = "rad", .unit_everywhere = "s", .minimum = 0.0, .maximum = 1000000000.0}, {.name = "stiffness", .unit = "N/m", .unit_at_joint = "N.m/rad", .minimum = 0.0, .maximum = 1000000000000.0}, {.name = "relaxation_time", .unit = "s", .minimum = 0.0, .maximum = 1000000000.0}, {.name = "share", .unit = "1", .minimum = 0.0, .maximum = 1000000000.0, .above_minimum = 1}, {.name = "follows_limit", .unit = "1", .minimum = 0.0, .maximum = 1.0}};
+static const effect_parameter presliding_numbers[] = {{.name = "displacement", .unit = "m", .unit_at_joint = "rad", .unit_everywhere = "s", .minimum = 0.0, .maximum = 1000000000.0}, {.name = "stiffness", .unit = "N/m", .unit_at_joint = "N.m/rad", .minimum = 0.0, .maximum = 1000000000000.0}, {.name = "relaxation_time", .unit = "s", .minimum = 0.0, .maximum = 1000000000.0}, {.name = "share", .unit = "1", .minimum = 0.0, .maximum = 1000000000.0, .above_minimum = 1}, {.name = "follows_limit", .unit = "1", .minimum = 0.0, .maximum = 1.0}, {.name = "filtered_travel", .unit = "1", .minimum = 0.0, .maximum = 1.0}};
 static const effect_parameter cord_stretch_numbers[] = {{.name = "stiffness", .unit = "N/m", .minimum = 1.0, .maximum = 1000000000000.0}};
 static const effect_parameter friction_drift_numbers[] = {{.name = "amplitude", .unit = "1", .minimum = -0.9, .maximum = 1000000000.0}, {.name = "time_constant", .unit = "s", .minimum = 0.0, .maximum = 1000000000.0, .above_minimum = 1}};
 static const effect_parameter tendon_nonlinearity_numbers[] = {{.name = "hardening", .unit = "N/m2", .minimum = 0.0, .maximum = 1000000000000.0}};
@@ -41,7 +41,7 @@ static const effect_type all_effects[EFFECT_COUNT] = {
   {.name = "moment_arm", .id = 9, .joint = PLACE_REQUIRED, .tendon = PLACE_REQUIRED, .rule = PLACES_AS_SAID, .parameter_count = LINKED(9, 1), .parameters = LINKED(9, moment_arm_numbers), .action = LINKED(9, &moment_arm_action)},
   {.name = "moment_arm_variation", .id = 10, .joint = PLACE_REQUIRED, .tendon = PLACE_REQUIRED, .rule = PLACES_AS_SAID, .parameter_count = LINKED(10, 2), .parameters = LINKED(10, moment_arm_variation_numbers), .action = LINKED(10, &moment_arm_variation_action)},
   {.name = "pulley_eccentricity", .id = 11, .joint = PLACE_REQUIRED, .tendon = PLACE_REQUIRED, .rule = PLACES_AS_SAID, .parameter_count = LINKED(11, 3), .parameters = LINKED(11, pulley_eccentricity_numbers), .action = LINKED(11, &pulley_eccentricity_action)},
-  {.name = "presliding", .id = 26, .joint = PLACE_OPTIONAL, .tendon = PLACE_OPTIONAL, .rule = PLACES_LEVEL_ALONE, .level = 1, .most = 2, .one_of = 2, .parameter_count = LINKED(26, 5), .parameters = LINKED(26, presliding_numbers), .action = LINKED(26, &presliding_action)},
+  {.name = "presliding", .id = 26, .joint = PLACE_OPTIONAL, .tendon = PLACE_OPTIONAL, .rule = PLACES_LEVEL_ALONE, .level = 1, .most = 2, .one_of = 2, .parameter_count = LINKED(26, 6), .parameters = LINKED(26, presliding_numbers), .action = LINKED(26, &presliding_action)},
   {.name = "cord_stretch", .id = 27, .joint = PLACE_REFUSED, .tendon = PLACE_REFUSED, .rule = PLACES_AS_SAID, .most = 1, .parameter_count = LINKED(27, 1), .parameters = LINKED(27, cord_stretch_numbers), .action = LINKED(27, &cord_stretch_action)},
   {.name = "friction_drift", .id = 21, .joint = PLACE_OPTIONAL, .tendon = PLACE_OPTIONAL, .rule = PLACES_AT_MOST_ONE, .parameter_count = LINKED(21, 2), .parameters = LINKED(21, friction_drift_numbers), .action = LINKED(21, &friction_drift_action)},
   {.name = "tendon_nonlinearity", .id = 22, .joint = PLACE_REFUSED, .tendon = PLACE_REQUIRED, .rule = PLACES_AS_SAID, .most = 1, .parameter_count = LINKED(22, 1), .parameters = LINKED(22, tendon_nonlinearity_numbers), .action = LINKED(22, &tendon_nonlinearity_action)},
@@ -63,7 +63,7 @@ static const effect_expectation expectations[EFFECT_COUNT][EFFECT_MAX_PARAMETERS
   {{NAN, 0.0005, 0.0}}, /* moment_arm */
   {{NAN, 0.0005, 0.0}, {0.0, 0.0005, 0.0}}, /* moment_arm_variation */
   {{0.0, 0.0005, 0.0}, {0.0, 0.0005, 0.0}, {1.0, 1.0, 0.0}}, /* pulley_eccentricity */
-  {{0.0, 0.0001, 0.05}, {0.0, 10000.0, 0.0}, {0.0, 1.0, 0.0}, {1.0, 1.0, 0.0}, {0.0, 0.0, 0.0}}, /* presliding */
+  {{0.0, 0.0001, 0.05}, {0.0, 10000.0, 0.0}, {0.0, 1.0, 0.0}, {1.0, 1.0, 0.0}, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}}, /* presliding */
   {{NAN, 100000.0, 0.0}}, /* cord_stretch */
   {{NAN, 0.3, 0.0}, {NAN, 100.0, 0.0}}, /* friction_drift */
   {{NAN, 100000.0, 0.0}}, /* tendon_nonlinearity */
