@@ -38,6 +38,11 @@ def cogging(series: Series) -> Numbers:
     return np.asarray(np.sin(2.0 * np.pi * 6.0 * angle / np.ptp(angle)))
 
 
+def ripple(series: Series) -> Numbers:
+    position = series.position[:, 1]
+    return np.asarray(np.sin(2.0 * np.pi * 6.0 * position / np.ptp(position)))
+
+
 def creep(series: Series) -> Numbers:
     return np.asarray(series.angle[:, 0] - low_passed(series.angle[:, 0], 2.0))
 
@@ -64,6 +69,7 @@ def test_noise_is_not_unknown(seed: int) -> None:
             (rubbing, 1.0, {"rubbing", "tendon", "velocity"}),
             (product, 1.0, {"angle"}),
             (cogging, 1.0, {"angle"}),
+            (ripple, 1.0, {"position"}),
             (creep, 2.0, {"memory of angle"}),
             (memory, 4.0, {"memory of speed"}),
             (oscillation, 0.3, {"line"}),

@@ -61,6 +61,7 @@ def series_with(target: Numbers) -> Series:
         force=many,
         tendon_velocity=np.zeros((blocks, 4, JOINTS)),
         travel=one,
+        position=many,
     )
 
 

@@ -18,6 +18,7 @@ Numbers = NDArray[np.float64]
 STEP = 0.01  # s
 NOISE = 0.01  # N·m
 ARMS = np.array([[0.008, 0.006], [-0.009, 0.007], [0.007, -0.01], [-0.01, -0.008]])  # m
+STIFFNESS = 6000.0  # N/m
 
 
 def bias_splines(series: BlockSeries, knots: float = 2.0) -> Any:
@@ -78,6 +79,7 @@ def make_series(seed: int, seconds: float = 60.0) -> Series:
         force=force,
         tendon_velocity=tendon,
         travel=np.stack([travelled(angle[:, j], velocity[:, j]) for j in range(2)], axis=1),
+        position=angle @ ARMS.T + force / STIFFNESS,
     )
 
 

@@ -162,7 +162,8 @@ def _p_value(gain: Numbers) -> float:
 def _named(learner: Learner, seen: Features) -> list[tuple[str, str]]:
     """Return for each joint the group whose columns predict best, and the subject of these, "" for all of the group."""
     pairs = [pair for pair in zip(seen.group.tolist(), seen.subject.tolist(), strict=True) if pair[0] != "interaction"]
-    known = list(dict.fromkeys([*((group, "") for group, _ in pairs), *pairs]))
+    wholes = [(group, "") for group, _ in pairs if group != "position"]  # those of all tendons are the angles
+    known = list(dict.fromkeys([*wholes, *pairs]))
     left = []
     for group, subject in known:
         columns = np.flatnonzero((seen.group == group) & ((seen.subject == subject) | (not subject)))

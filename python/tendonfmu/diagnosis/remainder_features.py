@@ -105,6 +105,7 @@ GROUPS = {
     "time": "the time since the start, with the direction of motion (slow change of friction)",
     "rubbing": "the motion of two tendons against each other (rubbing)",
     "tendon": "the velocity of a tendon",
+    "position": "the position of a tendon (a motor, gear or drum that ripples)",
     "torque": "the torque of another joint",
     "interaction": "several of angle, velocity, force and history together",
 }
@@ -359,6 +360,7 @@ def _of_tendons(series: Series, states: _States) -> _Made:
     mean_force = np.abs(series.force).mean(axis=0).clip(1e-12)
     load = series.force / mean_force
     for tendon in range(tendons):
+        yield "position", f"tendon {tendon + 1}", _spline(series.position[:, tendon], RIPPLES)
         for joint in range(joints):
             ratio = series.tendon_velocity[:, tendon, joint] / states.tendon_speed[tendon]
             steps = [np.tanh(ratio / scale) for scale in (0.03, 0.1, 0.3)]

@@ -39,6 +39,7 @@ class Series(BlockSeries):
     force: Numbers  # N [B, m]
     tendon_velocity: Numbers  # ẋ_ij, m/s [B, m, n]
     travel: Numbers  # travel since the joint last reversed, rad [B, n]
+    position: Numbers  # R q + f/k of the tendons, m [B, m]
 
 
 def exact_model(data: Mapping[str, Any], recording: FitRecording, *, jumps: bool = True) -> Numbers:
@@ -62,7 +63,8 @@ def make_series(
     """Average the signals over the blocks of a grid; `left` is what a description leaves of the torque [B, n], N·m."""
     threshold, segments = number_of(data, "velocity_threshold.joint"), grid.segments
     angles, speeds = ([getattr(each.model, name) for each in recordings] for name in ("joint_angle", "joint_speed"))
-    velocity = grid.means(speeds)
+    velocity, angle, force = grid.means(speeds), grid.means(angles), grid.forces(recordings)
+    arms, stiffness = moment_arms(data), np.array([tendon["stiffness"] for tendon in data["tendons"]])
     travels = [_travel(angles[one.recording], speeds[one.recording], threshold, one) for one in segments]
     return Series(
         time=grid.means([recording.time for recording in recordings]),
@@ -71,12 +73,13 @@ def make_series(
         target=left,
         used=used,
         step=grid.step,
-        angle=grid.means(angles),
+        angle=angle,
         velocity=velocity,
         acceleration=np.concatenate([_slope(velocity[segment.blocks], grid.step) for segment in segments]),
-        force=grid.forces(recordings),
-        tendon_velocity=_tendon_velocity(moment_arms(data), velocity),
+        force=force,
+        tendon_velocity=_tendon_velocity(arms, velocity),
         travel=np.concatenate(travels),
+        position=angle @ arms.T + force / stiffness,
     )
 
 
