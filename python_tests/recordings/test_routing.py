@@ -196,7 +196,7 @@ def test_arm_stiffness_and_unit_are_named(index: tuple[Finger, Recording]) -> No
     lines = [finding.line() for finding in belongs(changed(finger, arms=0.1, stiffness=0.625), [recording])]
     assert len(lines) == 8
     assert "moment arm at joint mcp_abduction is 9.09 to 9.1 % smaller than described" in lines[0]
-    assert "stiffness is 59.9 to 60 % larger than described" in lines[1]
+    assert "N/m, 59.9 to 60 % larger than described" in lines[1]
     grams = {**recording.groups, "tendon_force": recording.groups["tendon_force"] / 9.80665e-3}
     (unit,) = belongs(finger, [replace(recording, groups=grams)])
     assert unit.severity == "error" and '"unit": "gf"' in unit.line()

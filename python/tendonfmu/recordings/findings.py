@@ -287,8 +287,8 @@ def routing_sentences(finger: Finger, learned: TendonRouting) -> Iterator[str]:
             share = percent(learned.varying[j])
             yield f"moment arm at joint {finger.joint_names[j]} changes by {share} with its angle"
     if learned.stiffness.differs:
-        found = f"{learned.stiffness.value:.4g} N/m"
-        yield f"stiffness is {_off(learned.stiffness)} than described ({found}), or the gain of its force sensor is off"
+        found = f"stiffness is {learned.stiffness.value:.4g} N/m, {_off(learned.stiffness)} than described"
+        yield f"{found}, or the gain of its force sensor is off"
     if (zero := learned.zero).differs:
         off = zero.value - zero.described
         force = -off * learned.stiffness.value
@@ -307,8 +307,8 @@ def routing_entry(finger: Finger, learned: Sequence[TendonRouting]) -> RoutingEn
     changed = {number.path for number in routed(finger, learned)[1]}
     sentences = [f"routing: {_of_tendon(finger, each)}" for each in learned if each.differs or each.varying]
     if any(each.seen_from for each in learned):
-        shown = "the stiffness of every tendon" + ", and arms and zeros of one against the other" * (finger.joints == 1)
-        sentences.append(f"routing: without joint positions, redundant tendons show {shown}; the others stay")
+        shown = "stiffness" if finger.joints > 1 else "stiffness, and arms and zeros of one against the other"
+        sentences.append(f"routing: without joint positions, redundant tendons show their {shown}; the rest stays")
     elif unknown := [path for each in learned for path in each.unknown]:
         sentences.append(f"routing: this motion does not determine {', '.join(unknown)}; the described values stay")
     numbers: list[LearnedNumber] = [
