@@ -14,6 +14,7 @@ certain. The rules by which a round chooses a cause, in their order:
 6. The effect is fitted at the nearly best places, too, and the best is taken; in place of several of a joint or tendon
    one alone if it is better by more than what does not count.
 7. A single sensor may be several, if their usual errors explain nearly as much (`beside_calibration`).
+8. At last, friction by the force of several tendons at a joint is that by the force of all, if they gain little over it.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ from tendonfmu.diagnosis.base import POSITION, Base, forgetful, refitted, rememb
 from tendonfmu.diagnosis.candidate_columns import EVERYWHERE, Candidate, Proposal
 from tendonfmu.diagnosis.contact_scan import events_of
 from tendonfmu.diagnosis.delay import DELAY, SHOWN
-from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION, OF_LAW, Place, Term, Where
+from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION, OF_LAW, Place, Term, Where, by_name
 from tendonfmu.diagnosis.extension_fit import (
     REMEMBERING,
     FittedModel,
@@ -226,6 +227,7 @@ NEARLY = 0.8  # of the gain of a single sensor: prior knowledge always takes a p
 # loads as friction, or scales the torque, resembles that.
 FORM = 0.09
 LIKE_A_LAW = {*OF_LAW, *SCALING}
+OF_ONE, OF_ALL = "load_friction", "joint_load_friction"
 
 
 @dataclass(frozen=True)
@@ -255,6 +257,8 @@ class ExtensionSearch(CauseSearch):
         plain = forgetful(self.model, self.base.samples, self.base.settings)
         self.of_memory = float(self.base.left_unseen(plain).sum() - self.view.selection.base.sum())
         super().run(step)
+        for joint in range(1, len(self.base.nominal.data["joints"]) + 1):
+            self._unite(joint)
 
     def _try_next(self, tried: set[str]) -> tuple[Judged, bool] | None:
         tried = tried | self._answered
@@ -300,10 +304,10 @@ class ExtensionSearch(CauseSearch):
         gain, p_value = with_error(*selection.gain(cause)), self.view.p_value(cause.mix)
         return replace(cause, terms=cause.scaled(), gain=gain, p_value=p_value)
 
-    def _tried(self, cause: Judged) -> Trial:
-        """Fit the description with a further cause."""
+    def _tried(self, cause: Judged, beside: Sequence[Judged] | None = None) -> Trial:
+        """Fit the description with a further cause, beside all others or some."""
         base = self.base
-        everything = terms_of([*self.causes, cause])
+        everything = terms_of([*(self.causes if beside is None else beside), cause])
         terms = possible(base.nominal.data, everything)
         if len(terms) < len(everything):
             return Trial(cause, None, np.array([np.inf]))
@@ -350,6 +354,25 @@ class ExtensionSearch(CauseSearch):
         self.causes = [cause for cause in self.causes if cause.effect not in REMEMBERING]
         self.causes += [_of_start(terms) for terms in memory]
         return other
+
+    def _unite(self, joint: int) -> None:
+        """Take friction by the force of all tendons for that of several at a joint, which would have to gain more."""
+        base, single = self.base, [cause for cause in self.causes if cause.effect == OF_ONE]
+        terms = [term for cause in single for term in cause.terms if term.place.joint == joint]
+        others = [cause for cause in self.causes if not any(term in terms for term in cause.terms)]
+        if len(terms) < 2 or len(terms_of(others)) + len(terms) < len(terms_of(self.causes)):
+            return
+        bare = fit_extended(base.nominal, terms_of(others), base.samples, base.settings, self.model, rough=True)
+        selection = base.look(bare, [by_name(OF_ALL)]).selection
+        united = [each for each in selection.ranked(set()) if each.where.joint == joint]
+        if not united:
+            return
+        p_value = min(cause.p_value for cause in single)
+        trial = self._tried(replace(united[0], terms=united[0].scaled(), p_value=p_value, alike=tuple(single)), others)
+        if trial.model is not None and rms_gain(trial.error, self.view.selection.base)[0] < self._least_gain:
+            self.causes = [*others, trial.cause]
+            self.model = refitted(trial.model, base.samples, base.settings)
+            self.view = base.look(self.model)
 
     @cached_property
     def small(self) -> list[Judged]:
