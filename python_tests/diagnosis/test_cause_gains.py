@@ -104,6 +104,34 @@ def test_a_refused_cause_has_the_gain_of_its_fit(monkeypatch: pytest.MonkeyPatch
 
 
 @pytest.mark.parametrize(
+    ("tendons", "left", "united"),
+    [((1, 2, 3), 1.02, True), ((1, 2, 3), 1.1, False), ((2,), 1.0, False)],  # Σ e² with one number for all tendons
+)
+def test_friction_by_several_tendons_is_that_by_all(
+    tendons: tuple[int, ...], left: float, united: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At joint 1, beside another joint's; several must gain what counts over one."""
+    before = np.full(20, 0.05)
+    terms = tuple(Term(by_name("load_friction"), Place(1, tendon)) for tendon in tendons)
+    other = Judged(Where("load_friction", 2, 1), (Term(by_name("load_friction"), Place(2, 1)),))
+    together = Judged(Where("joint_load_friction", 1))
+    selection = SimpleNamespace(base=before, ranked=lambda _: [together])
+    search = object.__new__(ExtensionSearch)
+    search.base = cast("Any", SimpleNamespace(nominal=None, samples=None, settings=None))
+    search.base.look = lambda *_: SimpleNamespace(selection=selection)  # type: ignore[method-assign]
+    search.view, search.model = cast("Any", SimpleNamespace(selection=selection)), cast("Any", None)
+    search._least_gain, search.causes = 0.03, [Judged(Where("load_friction", 1), terms, p_value=1e-9), other]
+    monkeypatch.setattr(search_module, "fit_extended", lambda *_, **__: None)
+    monkeypatch.setattr(search_module, "refitted", lambda *_: None)
+    monkeypatch.setattr(search, "_tried", lambda cause, _: Trial(cause, cast("Any", object()), left * before))
+    search._unite(1)
+    assert [cause.where.effect for cause in search.causes] == (
+        ["load_friction", "joint_load_friction"] if united else ["load_friction"] * 2
+    )
+    assert not united or (search.causes[0] is other and search.causes[1].p_value == 1e-9)
+
+
+@pytest.mark.parametrize(
     ("left", "taken"),
     [
         ({"single": 0.95}, "single"),
