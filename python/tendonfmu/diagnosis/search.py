@@ -14,7 +14,7 @@ certain. The rules by which a round chooses a cause, in their order:
 6. The effect is fitted at the nearly best places, too, and the best is taken; in place of several of a joint or tendon
    one alone if it is better by more than what does not count.
 7. A single sensor may be several, if their usual errors explain nearly as much (`beside_calibration`).
-8. At last, friction by the force of several tendons at a joint is that by the force of all, if they gain little over it.
+8. At last, friction by the force of several tendons at a joint is that by the force of all, if they gain little more.
 """
 
 from __future__ import annotations
