@@ -90,6 +90,17 @@ def test_a_spring_that_stiffens_has_the_described_zero(hardening: float, share: 
     assert placed(find_kinematic_causes(given, 0.03, 0).causes) == [("tendon_nonlinearity", None, 2)]
 
 
+@pytest.mark.parametrize("with_reference", [False, True])
+def test_an_arm_that_is_a_little_off_is_no_cause_but_corrected(with_reference: bool) -> None:
+    now = FINGER.but("arm", 0.012, tendon=1, joint=0)
+    answer = found(now, FINGER if with_reference else None)
+    assert answer.causes == () and placed(answer.too_small) == [("moment_arm", 1, 2)]
+    arm, described = (
+        data["tendons"][1]["moment_arms"][0] for data in (answer.edited(FINGER.description), FINGER.description)
+    )
+    assert arm / described == pytest.approx(1.0 if with_reference else 1.012, abs=0.002)
+
+
 def test_a_coupling_and_several_places() -> None:
     now = FINGER.but("coupling", 5e-4, tendon=1, joint=1).but("zero", 2e-4, tendon=0).but("zero", -1e-4, tendon=3)
     causes = found(now, FINGER).causes

@@ -86,6 +86,7 @@ class KinematicCauses:
     is_change: bool
     known: dict[Where, Off] = field(default_factory=dict)  # every number that the recordings show
     off: tuple[Off, ...] = ()  # those that are causes
+    minor: tuple[Off, ...] = ()  # certain, but too small for a cause: corrected, too, as `calibrate` does
     causes: tuple[Cause, ...] = ()
     too_small: tuple[Cause, ...] = ()
     uncertain: tuple[Cause, ...] = ()
@@ -98,7 +99,7 @@ class KinematicCauses:
 
         An encoder's offset is taken from the recordings in both cases.
         """
-        if not self.off:
+        if not (self.off or self.minor):
             return given
         finger, moved = given.finger, self.off
         if not self.is_change:
@@ -111,13 +112,14 @@ class KinematicCauses:
     def edited(self, data: Data) -> dict[str, Any]:
         """Return a description with the numbers that are off; none is an encoder's."""
         edited: dict[str, Any] = copy.deepcopy(dict(data))
-        for off in self.off:
+        every = (*self.off, *self.minor)
+        for off in every:
             if off.where.effect != ENCODER:
                 path, number = off.number.path, off.number
                 now = data_number(data, path) + number.off if self.is_change else number.rounded
                 add_to_number(edited, path, now - data_number(data, path))
         before, after = Geometry.of(data), Geometry.of(edited)
-        for off in self.off:
+        for off in every:
             if off.where.effect == SPRING and off.where.tendon is not None:
                 row = off.where.tendon - 1
                 moved = (after.compliance[row] - before.compliance[row]) * off.centre
@@ -220,7 +222,10 @@ def _judged(
     rest = list(_causes(given, found, small, known, lambda own: unseen.gain(base, [*kept, *own], own)))
     certain = [cause for cause in rest if cause.gain.low > 0.0]
     uncertain = [replace(cause, experiment=LONGER) for cause in rest if not cause.gain.low > 0.0]
-    return replace(found, off=tuple(kept), causes=tuple(causes), too_small=tuple(certain), uncertain=tuple(uncertain))
+    named = {cause.where.effect for cause in certain} & {ARM, SPRING, ZERO}
+    minor = () if found.is_change else tuple(each for each in small if each.where.effect in named)
+    judged = replace(found, off=tuple(kept), causes=tuple(causes), too_small=tuple(certain), minor=minor)
+    return replace(judged, uncertain=tuple(uncertain))
 
 
 def _is_certain(off: Off, tested: int) -> bool:
