@@ -295,6 +295,7 @@ class FitOptions(Options):
     previous: File | None = option(
         None, "report or description of an earlier fit, as the prior", "PREVIOUS.json", names=("--from",)
     )
+    start: File | None = option(None, "batch: where to begin, as an interrupted fit left it", "UNFINISHED.json")
     effective_samples: bool = option(True, "count correlated residuals as fewer samples")
     passes: int | None = option(None, "most passes over the data [default: 60; ekf: 2]", "N", 1)
     tolerance: float = option(0.3, "batch: last step, in standard errors", "SIZE", 1e-9, 0.5)
@@ -307,6 +308,8 @@ class FitOptions(Options):
             raise InputError(
                 f"drift = {self.drift!r}: expected 0 with method {self.method}; only method ekf lets parameters drift"
             )
+        if self.start is not None and self.method != "batch":
+            raise InputError(f"start: expected none with method {self.method}, which begins at the given numbers")
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

@@ -184,6 +184,11 @@ def drawn_from_the_prior(seed: int, prior_std: float) -> tuple[Description, Arra
     return with_values(description, twin_of(description, group, unknowns).moved(z)), z
 
 
+def test_the_numbers_drawn_are_those_of_the_finger() -> None:
+    truth, z = drawn_from_the_prior(1, 0.05)
+    np.testing.assert_allclose(Learner(image_of(truth), groups(truth)).z, z, rtol=1e-9)
+
+
 def without_slack(truth: Description, seed: int, seconds: float) -> Recording:
     for attempt in range(seed, seed + 100_000, 1000):
         motion = wavy_motion(attempt, seconds, 200.0, 2)

@@ -143,7 +143,10 @@ def test_ctrl_c_leaves_the_best_so_far_from_which_a_fit_goes_on(
     assert run.returncode == 130
     assert "the best estimate so far is in fitted.unfinished.json" in rest.decode().splitlines()[-1]
     assert [path.name for path in tmp_path.iterdir()] == ["fitted.unfinished.json"]
-    command[1] = "fitted.unfinished.json"
+    if method == "batch":
+        command += ["--start", "fitted.unfinished.json"]
+    else:
+        command[1] = "fitted.unfinished.json"
     answer = call(*command, "--passes", "1", "--holdout", "0.9")
     assert answer.status == 0
     assert call("check", "fitted.json").status == 0

@@ -6,6 +6,7 @@ import copy
 import json
 import re
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -374,6 +375,7 @@ def test_an_initial_bias_near_zero_is_identified_by_its_own_error() -> None:
         ({"scale": ["joints[1].friction"]}, "expected PATTERN=VALUE"),
         ({"scale": ["joints[1].friction.static=-1"]}, "expected PATTERN=VALUE"),
         ({"share": ["fingers"]}, "--share fingers: matches none"),
+        ({"start": "left.json", "method": "ekf"}, "start: expected none with method ekf"),
         ({"drift": 1e-3}, "drift = 0.001: expected 0 with method batch"),
         ({"finger": PULLEY_WITHOUT_DROP}, "without (static = coulomb); expected laws of the same structure"),
     ],
@@ -392,7 +394,7 @@ def test_what_is_not_fitted_says_so() -> None:
 
 
 @pytest.mark.parametrize("method", [pytest.param("batch", marks=pytest.mark.long), "ekf"])
-def test_a_stopped_fit_is_marked_and_another_goes_on_from_its_finger(method: str) -> None:
+def test_a_stopped_fit_is_marked_and_another_goes_on_from_its_finger(method: str, tmp_path: Path) -> None:
     """Several recordings, so that a pass takes over 50 ms: `fit` reports progress that often."""
     recording = [made_recording(duration=40.0)] * (4 if method == "batch" else 1)
 
@@ -402,10 +404,29 @@ def test_a_stopped_fit_is_marked_and_another_goes_on_from_its_finger(method: str
     stopped = shared(moved_start(), method=method, progress=goes_on).fit(recording)
     assert not stopped.finished_ and not hasattr(stopped, "description_")
     assert stopped.unfinished_ is not None
-    whole, again = (shared(start, method=method).fit(recording) for start in (moved_start(), stopped.unfinished_))
-    known = [entry["path"] for entry in whole.report_["parameters"] if entry["identified"]]
-    away = [(again.parameters_[path] - whole.parameters_[path]) / whole.standard_errors_[path] for path in known]
-    assert np.abs(away).max() < (0.1 if method == "batch" else 2.0)
+    whole = shared(moved_start(), method=method).fit(recording)
+    if method == "batch":
+        stopped.unfinished_.write(tmp_path / "left.json")
+        again = shared(moved_start(), start=tmp_path / "left.json").fit(recording)
+    else:
+        again = shared(stopped.unfinished_, method=method).fit(recording)
+    assert away(again, whole) < (0.1 if method == "batch" else 2.0)
+
+
+def away(one: FrictionFit, other: FrictionFit) -> float:
+    """The largest difference of what `other` has identified, in its standard errors."""
+    known = [entry["path"] for entry in other.report_["parameters"] if entry["identified"]]
+    return max(abs(one.parameters_[path] - other.parameters_[path]) / other.standard_errors_[path] for path in known)
+
+
+def test_where_a_fit_starts_is_not_what_is_known_before(tmp_path: Path) -> None:
+    """At the end of a fit with a wide prior, data ask for nothing: as prior, its numbers would stay."""
+    wide = shared(moved_start(), prior=1.0).fit(made_recording())
+    wide.description_.write(tmp_path / "wide.json")
+    whole, again = (
+        shared(moved_start(), start=start).fit(made_recording()) for start in (None, tmp_path / "wide.json")
+    )
+    assert away(again, whole) < 0.1 < away(wide, whole)
 
 
 def test_numbers_that_wander_are_known_less() -> None:

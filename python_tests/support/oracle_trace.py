@@ -12,6 +12,7 @@ oracle (`run_recorder`).
 from __future__ import annotations
 
 import copy
+import json
 import math
 import re
 from collections.abc import Mapping
@@ -41,7 +42,7 @@ def without_contact(description: Mapping[str, Any]) -> dict[str, Any]:
 
 def with_values(description: Mapping[str, Any], values: Mapping[str, float]) -> dict[str, Any]:
     """The description with the numbers at some paths replaced (`tendons[1].edge_friction[2].laws[1].coulomb`)."""
-    changed = copy.deepcopy(dict(description))
+    changed = json.loads(json.dumps(description))  # copy.deepcopy keeps what places share: one would move all
     for path, value in values.items():
         place: Any = changed
         *before, last = re.findall(r"[a-z_]+|\d+", path)

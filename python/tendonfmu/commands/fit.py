@@ -202,7 +202,7 @@ def fit_files(
     progress: Progress = None,
 ) -> None:
     """Ctrl-C saves the best estimate so far in FITTED.unfinished.json."""
-    inputs = [finger, *recordings, *options.files("compare", "previous")]
+    inputs = [finger, *recordings, *options.files("compare", "previous", "start")]
     estimate.check_outputs(output, report, figures, inputs)
     if ssv is not None:
         fmu.check_parameter_set_path(ssv, *inputs)
@@ -213,7 +213,7 @@ def fit_files(
     except FitInterrupted as stopped:
         left = output.with_name(f"{output.stem}.unfinished.json")
         stopped.unfinished.write(left)
-        fail(f"interrupted; the best estimate so far is in {left}, a description that fit can start from")
+        fail(f"interrupted; the best estimate so far is in {left}, a description that fit can --start from")
         sys.exit(INTERRUPTED)
     if ssv is not None:
         result.write(ssv)

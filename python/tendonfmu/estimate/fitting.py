@@ -165,7 +165,7 @@ class FrictionFit:
         if learned is None:
             return self
         # an interruption while the result is judged must not lose the estimate
-        self.unfinished_ = self._unfinished(Interrupted(learned.estimator, learned.z, learned.cost, by_user=True))
+        self.unfinished_ = learned.fitted(self.structure_)
         self._conclude(learned, compared, remarks, previous is not None)
         self.unfinished_ = None
         for sentence in self.warnings_:
@@ -196,6 +196,7 @@ class FrictionFit:
             settings_of(self.start_.data, self.recordings_, passes=options.passes or passes),
             options=options,
             previous=previous,
+            begin=None if options.start is None else read_finger(options.start),
         )
         self.remembered_: Remembered | None = None
         try:
@@ -205,15 +206,12 @@ class FrictionFit:
             else:
                 learned = learn(self.structure_, self.recordings_, watch, settings)
         except Interrupted as stopped:
-            self.unfinished_ = self._unfinished(stopped)
+            self.unfinished_ = with_values(self.structure_, stopped.estimator.values(stopped.z))
             if stopped.by_user:
                 raise KeyboardInterrupt from None
             return None
         self.seconds_ = perf_counter() - begin
         return learned
-
-    def _unfinished(self, stopped: Interrupted) -> Finger:
-        return with_values(self.structure_, stopped.estimator.values(stopped.z))
 
     def _evaluated(self, learned: Learned) -> list[Evaluation]:
         self.description_ = learned.fitted(self.structure_)

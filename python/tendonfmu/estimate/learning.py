@@ -33,6 +33,7 @@ class Settings:
     previous: PreviousFit | None = None  # previous fit that the start of the structure comes from, or None
     noise: float = 0.0  # torque noise of the description (N·m)
     torque: float = 0.0  # rms of the torque to explain (N·m)
+    begin: Finger | None = None  # where to begin, if not at the start of the structure, which is the prior's mean
     near: bool = False  # whether the start is near the minimum: then a memory needs no other starts
 
 
@@ -82,9 +83,9 @@ class Learned:
 class Interrupted(Exception):
     """The estimation was stopped."""
 
-    def __init__(self, estimator: Estimator, z: Numbers, cost: float, by_user: bool) -> None:
+    def __init__(self, estimator: Estimator, z: Numbers, by_user: bool) -> None:
         super().__init__("stopped")
-        self.estimator, self.z, self.cost, self.by_user = estimator, z, cost, by_user
+        self.estimator, self.z, self.by_user = estimator, z, by_user
 
 
 class Watch:

@@ -19,7 +19,7 @@ from tendonfmu.arrays import Data, Numbers
 from tendonfmu.estimate.core_runs import CoreRuns, SlowDrift
 from tendonfmu.estimate.estimation import Estimator
 from tendonfmu.estimate.fit_report import MemoryEntry
-from tendonfmu.estimate.learning import Learned, Settings, Watch, unknown_names
+from tendonfmu.estimate.learning import Learned, Settings, Watch
 from tendonfmu.estimate.memory import (
     CHOSEN,
     CORDS,
@@ -366,10 +366,10 @@ def _with_what_shows(
     """Fit, and fit again without what the motion does not show."""
     learned, gone = learn_batch(structure, recordings, watch, settings), []
     while path := _not_shown(structure, learned):
-        values = dict(zip(unknown_names(learned.estimator), learned.z.tolist(), strict=True))
+        near = replace(settings, near=True, begin=learned.fitted(structure))
         gone.append(path)
         structure = build_structure(structure.start.with_data(without_time(structure.start.data, path)), choice)
-        learned = learn_batch(structure, recordings, watch, replace(settings, near=True), values)
+        learned = learn_batch(structure, recordings, watch, near)
     return structure, learned, gone
 
 

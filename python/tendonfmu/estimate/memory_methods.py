@@ -221,8 +221,7 @@ def learn_with_memory(
             passes += 1
             blocks = problem.runs.grid.blocks
             if not watch(FitProgress(f"step {number}, {what}", passes, blocks, blocks, state.cost)):
-                z = problem.scale.unknowns(state.u)
-                raise Interrupted(estimator, z, state.cost, watch.by_user)
+                raise Interrupted(estimator, problem.scale.unknowns(state.u), watch.by_user)
 
         return show
 
@@ -232,7 +231,7 @@ def learn_with_memory(
         weights = _weights(problem, recordings, shares)
         return learned_of(problem, last, prior, settings.options.prior, weights, steps, passes)
     except KeyboardInterrupt:
-        raise Interrupted(estimator, begin, float("nan"), by_user=True) from None
+        raise Interrupted(estimator, begin, by_user=True) from None
 
 
 def _weighted(

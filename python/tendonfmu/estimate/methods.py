@@ -11,7 +11,7 @@ are more strongly correlated.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -30,7 +30,6 @@ from tendonfmu.estimate.learning import (
     Watch,
     inverse,
     most_likely,
-    unknown_names,
 )
 from tendonfmu.estimate.memory import has_memory
 from tendonfmu.estimate.memory_methods import learn_with_memory, learned_with_memory_at, stroke_time
@@ -38,8 +37,6 @@ from tendonfmu.estimate.structure import Structure
 from tendonfmu.files import counted
 from tendonfmu.recordings import FitRecording
 from tendonfmu.statistics import sample_weights
-
-Start = Mapping[str, float]  # unknowns by name
 
 
 def _estimator(structure: Structure, recordings: Sequence[FitRecording]) -> Estimator:
@@ -98,18 +95,12 @@ def _measured_weights(
     return weights
 
 
-def learn_batch(
-    structure: Structure,
-    recordings: Sequence[FitRecording],
-    watch: Watch,
-    settings: Settings,
-    start: Start | None = None,
-) -> Learned:
-    """Estimate by maximum likelihood."""
+def learn_batch(structure: Structure, recordings: Sequence[FitRecording], watch: Watch, settings: Settings) -> Learned:
+    """Estimate by maximum likelihood. Raises Interrupted."""
     estimator = _estimator(structure, recordings)
     begin = estimator.start
-    if start is not None:
-        begin = _within(estimator, np.array([start[name] for name in unknown_names(estimator)]))
+    if settings.begin is not None:
+        begin = _within(estimator, estimator.unknown_values(structure.values_of(settings.begin)))
     if structure.needs_runs:
         return learn_with_memory(structure, estimator, recordings, watch, settings, begin)
     added = _add_recordings(estimator, recordings)
@@ -180,12 +171,12 @@ def _fitted(
     estimator: Estimator, begin: Numbers, prior: Numbers, settings: Settings, watch: Watch, what: str
 ) -> BatchResult:
     """Fit from `begin` [u]. `what` is added to the words of each phase. Raises Interrupted."""
-    best, best_cost = begin, float("nan")
+    best = begin
     estimator.set_known(inverse(prior))  # [u, u]
 
     def show(number: int, stride: int, done: int, total: int, cost: float, z: Numbers) -> bool:
-        nonlocal best, best_cost
-        best, best_cost = np.array(z, dtype=float), float(cost)
+        nonlocal best
+        best = np.array(z, dtype=float)
         phase = f"pass {number}" if stride == 1 else f"pass {number}, 1 of {stride} samples"
         return watch(FitProgress(f"{phase}{what}", number, done, total, cost))
 
@@ -199,9 +190,9 @@ def _fitted(
             progress=show,
         )
     except KeyboardInterrupt:
-        raise Interrupted(estimator, best, best_cost, by_user=True) from None
+        raise Interrupted(estimator, best, by_user=True) from None
     if watch.stopped or result.stopped:
-        raise Interrupted(estimator, result.z, result.cost, watch.by_user)
+        raise Interrupted(estimator, result.z, watch.by_user)
     return result
 
 
@@ -288,9 +279,9 @@ def _filter_once(
             except EstimationError as refused:  # the filter diverges: a unit or a scale is wrong
                 raise InputError(f"{recording.path}: {refused}") from None
             except KeyboardInterrupt:
-                raise Interrupted(estimator, learner.z, float("nan"), by_user=True) from None
+                raise Interrupted(estimator, learner.z, by_user=True) from None
             if watch.stopped:
-                raise Interrupted(estimator, learner.z, float("nan"), watch.by_user)
+                raise Interrupted(estimator, learner.z, watch.by_user)
             standardised[part] = outputs["innovation"] / np.sqrt(outputs["innovation_variance"])
             before += part.stop - part.start
         innovations.append(np.where(recording.train[:, None], standardised, np.nan))

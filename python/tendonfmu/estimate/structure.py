@@ -63,6 +63,13 @@ class Structure:
         """Path -> index among the p parameters."""
         return {path: k for k, path in enumerate(self.start.numbers)}
 
+    def values_of(self, finger: Finger) -> Numbers:
+        """Return [p] the values of its parameters in another finger. Raises InputError."""
+        numbers = finger.model.numbers
+        if missing := [path for path in self.index if path not in numbers]:
+            raise InputError(f"{finger.path}: no {missing[0]}; expected the structure of {self.start.path}")
+        return np.array([numbers[path].start for path in self.index])
+
     @property
     def needs_runs(self) -> bool:
         """Whether the estimator lacks its derivatives: friction remembers, or numbers of extensions are estimated."""
