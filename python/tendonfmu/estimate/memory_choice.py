@@ -50,7 +50,7 @@ DISTANCE = 2e-4  # m, to start from: what a cord on a pulley moves before it sli
 STEPS, TOLERANCE = 12, 0.3
 TIME = 0.1  # s, between the starts of `memory`
 SPLIT, SHARE = 0.4, 0.8  # ratio of a doubled element's numbers to the single one's, and share of the softer one
-QUIETER = 0.98  # of the squared error, with the travel of the filtered velocity: it comes late
+OTHERWISE = 0.96  # of the squared error, with another value of what is chosen: no number is fitted for it
 TYPICAL = 0.03  # friction of a place
 LONGER = 1.0, 30.0  # times the distance: relaxation within a sample imitates friction without any
 
@@ -122,12 +122,18 @@ class _Search:
         return form
 
     def whole(self, name: str, rows: Rows) -> Form:
-        """Fit a form with the travel of the angles, and with that of the filtered velocity; return the better one."""
-        form = self.fit(name, rows)
-        if any(recording.kinematics == 3 for recording in self._recordings):
+        """Fit a form with the travel of the angles or with that of the filtered velocity, whichever leaves less."""
+        return self._otherwise(self.fit(name, rows), FILTERED, "filtered")
+
+    def _otherwise(self, form: Form, key: str, what: str) -> Form:
+        """Return a form with another value of what is chosen, if it leaves less; with measured velocities no filter."""
+        if key == FILTERED and any(recording.kinematics == 3 for recording in self._recordings):
             return form
-        other = self.fit(f"{name}, filtered", _changed(rows, lambda _: {FILTERED: 1.0}), near=form)
-        return other if other.errors.sum() < QUIETER * form.errors.sum() else form
+        is_on = any(row.get(key) for row in form.rows)
+        bare = tuple({name: value for name, value in row.items() if name != key} for row in form.rows)
+        changed = bare if is_on else _changed(bare, lambda _: {key: 1.0})
+        other = self.fit(f"{form.name}, {'not ' if is_on else ''}{what}", changed, near=form)
+        return other if other.errors.sum() < OTHERWISE * form.errors.sum() else form
 
     def refined(self, form: Form) -> Finger:
         """Return the finger with a form that is fitted to all samples."""
@@ -160,6 +166,7 @@ class _Search:
         best = self.simpler(best, self.fit(f"{best.name}, two elements", _doubled(best.rows), near=best))
         if best is not single is whole:  # levels may differ in both elements only
             best = self.simpler(best, self.fit(f"{best.name}, levels", _by_level(data, best.rows), near=best))
+        best = self._otherwise(self._otherwise(best, FILTERED, "filtered"), FOLLOWS, "by limit")
         rigid = tuple(row for row in best.rows if row["effect"] != CORDS)
         if 2 <= len(rigid) < len(best.rows):  # what came after the cords may have replaced them
             best = self.simpler(self.fit(f"{best.name}, no cords", rigid, near=best), best)
