@@ -193,6 +193,9 @@ def test_no_more_tendons_than_joints_tell_no_delay(sound: FitRecording) -> None:
     few = replace(sound, recording=replace(sound.recording, groups={k: v for k, v in groups.items() if "tendon" in k}))
     assert Positions(described(data), [few]).delay is None
     assert Positions(described(data), [encoders]).delay == pytest.approx(0.0, abs=5e-4), "encoders tell it"
+    for tendon in data["tendons"]:
+        tendon["stiffness"] = 1e9
+    assert Positions(described(data), [encoders]).delay is None, "what does not give shows no force"
 
 
 @pytest.fixture(scope="module")

@@ -195,6 +195,16 @@ def test_a_number_that_was_driven_to_nothing_comes_back() -> None:
     assert fit_numbers(starved, samples, settings).values[path] < 1e-4 * known  # pinned to what it starts from
 
 
+def test_a_constant_bias_is_fitted() -> None:
+    """A fit that leaves slow errors out of its residual still says what they are on average."""
+    made, before = prepared(nominal(), 1), nominal()
+    before["bias"]["initial_torque"] = [0.0, 0.0]
+    torque = made.recording.groups["external_torque"] + np.array([0.05, -0.03])
+    samples = Samples.of(before, [made.with_groups(external_torque=torque)])
+    data = fit_numbers(before, samples, FitSettings(threads=1)).data
+    assert data["bias"]["initial_torque"] == pytest.approx([-0.05, 0.03], abs=0.002)
+
+
 def test_what_cannot_be_compared_is_refused() -> None:
     with pytest.raises(InputError, match="no sample to measure the gain on"):
         require_unseen([prepared(nominal(), 1)], [])

@@ -24,6 +24,7 @@ CLEAR_GAIN = 0.1  # of the rms that a starting delay must remove: any other miss
 CHANGING = ("moment_arm_variation", "pulley_eccentricity")  # arms
 SHOWN = (*BENDING, *CHANGING)  # what positions may contradict
 TENDONS = 1  # source of the angles: positions of the tendons
+STRETCHES = 1e-4  # of the travel (rms each) that a tendon stretches, at least: what hardly gives tells of no delay
 CLEAR = 0.25  # error of the best delay, at most, over the median error of all delays
 
 
@@ -78,6 +79,7 @@ class Positions:
         self._measured = all("joint_position" in own for own in groups)
         self._apart = np.eye(len(self._arms)) - (0.0 if self._measured else self._arms @ np.linalg.pinv(self._arms))
         tells = all("tendon_position" in own for own in groups) and np.linalg.matrix_rank(self._apart) > 0
+        tells = tells and any(self._stretches(each) for each in recordings)
         self._recordings = recordings if tells else ()
         self._behind = False  # whether the tendons' positions are as late as their forces
         # s, with its standard error; None: they do not show whether there is one
@@ -96,6 +98,12 @@ class Positions:
         pairs = [self._squares(*each, np.array([0.0, delay])) for each in judged]
         before, after = np.concatenate(pairs).T
         return gain_interval(before, after, seed, variance_between(pairs) / len(pairs))
+
+    def _stretches(self, recording: FitRecording) -> bool:
+        """Return whether a tendon stretches enough for positions to show forces of another time."""
+        groups = recording.recording.groups
+        stretch = np.std(groups["tendon_force"], axis=0) / self._stiffness
+        return bool((stretch > STRETCHES * np.std(groups["tendon_position"], axis=0)).any())
 
     def _found(self) -> tuple[float | None, float]:
         delays = np.arange(-LONGEST, LONGEST + FINE / 2, FINE)

@@ -182,7 +182,7 @@ def fit_numbers(
     begin = problem.state(np.clip(problem.mean, problem.lower, problem.upper))
     found = minimise(problem, begin, MOST_STEPS, TOLERANCE, rough=True)
     state, last = found.state, found.linearised if rough else problem.linearised(found.state)
-    numbers = problem.estimator.values(np.clip(problem.scale.unknowns(state.u), *problem.bounds))
+    numbers = problem.estimator.values(np.clip(problem.unknowns_at(state), *problem.bounds))
     log, size = problem.scale.log, problem.scale.size
     return FittedModel(
         data=with_values(structure, numbers).data,
