@@ -319,7 +319,7 @@ PARTS = {
         headlines={
             "da Vinci jaw.rows.0.errors.2": (0.0, 8.0),  # mN·m, odd loads
             "EMPS carriage.rows.0.errors.2": (0.0, 1.9),  # N, pulses
-            "PSM joints 1 and 2.rows.0.errors.2": (0.0, 130.0),  # mN·m
+            "PSM joints 1 and 2.rows.0.errors.2": (0.0, 150.0),  # mN·m
             "two wires.rows.0.errors.2": (0.0, 1.7),  # mN·m
         },
         tables={"errors": error_table, "causes": cause_table},

@@ -125,15 +125,15 @@ def test_corrections_of_the_torque_have_a_largest_size(columns: Numbers) -> None
         Made("gravity", 2, None),
     ]
     arms = np.array([[0.01, 0.01], [0.004, -0.008]])
-    reach, torque = np.array([1.0, 0.5]), np.array([np.inf, 0.1])
-    found = {each.effect: each for each in hypotheses(candidate_columns(columns[:, :, :5], made), arms, reach, torque)}
+    reach, weight = np.array([1.0, 0.5]), np.array([np.inf, 0.1])
+    found = {each.effect: each for each in hypotheses(candidate_columns(columns[:, :, :5], made), arms, reach, weight)}
     assert (found["force_gain"].low, found["force_gain"].high) == (
         -LARGEST_SCALING,
         LARGEST_SCALING,
     )
     assert found["moment_arm"].high == pytest.approx([LARGEST_SCALING * 0.008])
     assert found["moment_arm_variation"].high == pytest.approx([LARGEST_VARIATION * 0.008 / 0.5])
-    assert found["gravity"].high == pytest.approx([0.1 / np.sin(0.5)]), "no more than the torque that was measured"
+    assert found["gravity"].high == [0.1]
     assert found["load_friction"].high == [LARGEST]
 
 
@@ -319,7 +319,7 @@ def test_gain_of_the_rms_and_its_error() -> None:
 
 # --- sizes ------------------------------------------------------------------------------------------------------------
 
-SENSORS = LeastSizes(np.array([1e-4, 2e-4]), np.array([1e-6, 2e-6, 3e-6, 4e-6]), 0.004)
+SENSORS = LeastSizes(np.array([1e-4, 2e-4]), np.array([1e-6, 2e-6, 3e-6, 4e-6]), 0.004, np.array([0.3, 0.2]))
 
 
 def test_least_sizes_are_those_of_the_sensors() -> None:
@@ -333,6 +333,8 @@ def test_least_sizes_are_those_of_the_sensors() -> None:
     assert shows("backlash", Place(2), {"width": -4.1 * 2e-4})
     assert not shows("time_delay", Place(), {"delay": 0.9 * delay}) and shows("time_delay", Place(), {"delay": delay})
     assert shows("gravity", Place(1), {"sine": 1e-9}) and shows("backlash", Place(2), None)
+    assert shows("gravity", Place(2), {"cosine": -0.19})
+    assert not shows("gravity", Place(2), {"sine": 0.0, "cosine": -0.21}), "more than the torque that was measured"
 
 
 def test_what_is_far_too_small_is_no_hypothesis(columns: Numbers) -> None:

@@ -325,7 +325,7 @@ def test_negative_friction_is_no_cause() -> None:
         {"effect": "load_friction", "joint": 1, "tendon": i, "coulomb": size} for i, size in ((1, 1e-4), (2, -2e-4))
     ]
     terms = [Term(by_name("load_friction"), Place(1, i)) for i in (1, 2)]
-    least = LeastSizes(np.zeros(2), np.zeros(2), 0.005)
+    least = LeastSizes(np.zeros(2), np.zeros(2), 0.005, np.zeros(2))
     assert not least.shows_all("load_friction", terms, finger() | {"extensions": rows})
     assert least.shows_all("load_friction", terms[:1], finger() | {"extensions": rows})
 
@@ -339,6 +339,9 @@ def test_least_sizes_follow_the_sensors(sound: FitRecording) -> None:
     assert after.tendon_noise == pytest.approx(np.hypot(before.tendon_noise, 1e-5 * np.sqrt(0.85)), rel=0.15)
     assert np.all(after.joint_noise > 2.0 * before.joint_noise)
     assert after.least(Where("time_delay")) == pytest.approx(0.75 * 0.005)
+    torque = groups["tendon_force"] @ corrected_arms(finger())
+    torque, angle = (np.abs(each[noisy.train]).max(axis=0) for each in (torque, noisy.model.joint_angle))
+    assert after.heaviest == pytest.approx(torque / np.sin(angle))
 
 
 # --- causes -----------------------------------------------------------------------------------------------------------

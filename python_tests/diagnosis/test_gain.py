@@ -195,6 +195,14 @@ def test_a_number_that_was_driven_to_nothing_comes_back() -> None:
     assert fit_numbers(starved, samples, settings).values[path] < 1e-4 * known  # pinned to what it starts from
 
 
+def test_a_described_row_is_fitted_whole() -> None:
+    """A cover that hardens about another angle than described: the number that says so was not described."""
+    spring = {"effect": "cover_hardening", "joint": 1, "stiffness": 1.0}
+    samples = Samples.of(hidden(spring), [prepared(hidden(spring | {"quadratic": -0.3}), 1)])
+    found = fit_numbers(hidden(spring), samples, FitSettings(threads=1)).values
+    assert found["extensions[1].quadratic"] == pytest.approx(-0.3, rel=0.2)
+
+
 def test_a_constant_bias_is_fitted() -> None:
     """A fit that leaves slow errors out of its residual still says what they are on average."""
     made, before = prepared(nominal(), 1), nominal()

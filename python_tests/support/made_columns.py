@@ -25,7 +25,8 @@ Array = NDArray[Any]
 STEP = 0.01  # s
 BLOCKS = 3200
 JOINTS = 2
-UNSEEN = LeastSizes(np.zeros(JOINTS), np.zeros(4), STEP)  # of sensors that resolve everything but a delay
+# of sensors that resolve everything but a delay
+UNSEEN = LeastSizes(np.zeros(JOINTS), np.zeros(4), STEP, np.full(JOINTS, np.inf))
 
 
 def waves(rng: np.random.Generator, count: int, slowest: float = 0.1, fastest: float = 3.0) -> Numbers:

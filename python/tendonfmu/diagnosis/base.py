@@ -175,10 +175,15 @@ def _position_dependent(
     """
     data, held = _started(nominal, start)
     found: list[tuple[Term, ...]] = []
-    while best := look(data, samples, least, [by_name(name) for name in POSITION]).selection.best(least_gain):
-        found.append(best.scaled())
-        described = extended_description(data, found[-1])
-        data = refitted(FittedModel(described, nominal.given, {}, fixed=held), samples, settings, rough=True).data
+    refused: set[str] = set()
+    mechanisms = [by_name(name) for name in POSITION]
+    while best := look(data, samples, least, mechanisms).selection.best(least_gain, refused):
+        described = extended_description(data, terms := best.scaled())
+        model = refitted(FittedModel(described, nominal.given, {}, fixed=held), samples, settings, rough=True)
+        if least.shows_all(best.effect, terms, model.data):
+            data, found = model.data, [*found, terms]
+        else:
+            refused.add(best.effect)
     return found
 
 

@@ -142,15 +142,15 @@ class Candidate:
         return self.where.effect
 
 
-def hypotheses(columns: CandidateColumns, arms: Numbers, reach: Numbers, torque: Numbers) -> list[Candidate]:
+def hypotheses(columns: CandidateColumns, arms: Numbers, reach: Numbers, weight: Numbers) -> list[Candidate]:
     """Return all effects that the description may lack, the coarse ones first.
 
     Parameters
     ----------
     columns
         Columns of single places.
-    arms, reach, torque
-        Moment arms (m) [m, n]; largest angle (rad) and torque (N·m) of each joint in the recordings [n].
+    arms, reach, weight
+        Moment arms (m) [m, n]; largest angle in the recordings (rad), and heaviest weight (N·m), of each joint [n].
 
     Returns
     -------
@@ -158,7 +158,7 @@ def hypotheses(columns: CandidateColumns, arms: Numbers, reach: Numbers, torque:
         Each with the bounds that arms and recordings set.
     """
     count = columns.values.shape[2]
-    listed = [_single(proposal, count, arms, reach, torque) for proposal in columns.proposals]
+    listed = [_single(proposal, count, arms, reach, weight) for proposal in columns.proposals]
     for effect in SHARED:
         by_place: dict[Place, list[Proposal]] = {}
         for proposal in columns.proposals:
@@ -189,7 +189,7 @@ def _groups(effect: str, places: Sequence[Place]) -> Iterator[tuple[Where, int, 
 # --- effects that the description lacks -------------------------------------------------------------------------------
 
 
-def _single(proposal: Proposal, count: int, arms: Numbers, reach: Numbers, torque: Numbers) -> Candidate:
+def _single(proposal: Proposal, count: int, arms: Numbers, reach: Numbers, weight: Numbers) -> Candidate:
     variant, place, name = proposal.variant, proposal.place, proposal.mechanism.name
     mix = np.zeros((count, variant.count))
     mix[proposal.columns] = np.eye(variant.count)
@@ -201,8 +201,8 @@ def _single(proposal: Proposal, count: int, arms: Numbers, reach: Numbers, torqu
         if name == "moment_arm_variation" and place.joint is not None:
             largest = LARGEST_VARIATION * arm / max(float(reach[place.joint - 1]), 1e-9)
         low, high = np.maximum(low, -largest), np.minimum(high, largest)
-    if name == "gravity" and place.joint is not None:  # a larger one only imitates other torque beside the cover's
-        largest = float(torque[place.joint - 1] / np.sin(np.clip(reach[place.joint - 1], 1e-9, np.pi / 2)))
+    if name == "gravity" and place.joint is not None:
+        largest = float(weight[place.joint - 1])
         low, high = np.maximum(low, -largest), np.minimum(high, largest)
     if name == "friction_drift":
         high = np.minimum(high, LARGEST_DRIFT)

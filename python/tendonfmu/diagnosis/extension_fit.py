@@ -34,6 +34,7 @@ from tendonfmu.estimate import (
 )
 from tendonfmu.model import (
     Finger,
+    Number,
     effects,
     extension_rows,
     finger_of,
@@ -365,19 +366,24 @@ def _coarser(path: str) -> list[str]:
 def _with_scale(structure: Structure, given: Mapping[str, Any]) -> Structure:
     """Set the expected magnitudes of the numbers."""
     scale = structure.scale.copy()
+    ordinary: dict[str, float] = {}  # how many times its ordinary size a row of extensions has
+    for number in structure.numbers:
+        if number.extension:
+            row = _row(number)
+            ordinary[row] = max(ordinary.get(row, 0.0), abs(number.value) / number.size)
     for number in structure.numbers:
         for path in number.paths:
             if not np.isnan(scale[structure.index[path]]):
                 continue
-            for known in _coarser(path):
-                value = _number_or_none(given, known)
-                if value:
-                    scale[structure.index[path]] = abs(value)
-                    break
-            else:
-                begin = _number_or_none(structure.start.data, path)
-                scale[structure.index[path]] = NEW * abs(begin) if begin else TINY
+            described = next((abs(value) for known in _coarser(path) if (value := _number_or_none(given, known))), 0.0)
+            new = NEW * abs(_number_or_none(structure.start.data, path) or 0.0)
+            # where the row has another number, one that it lacks is as ordinary as that
+            scale[structure.index[path]] = described or new or ordinary.get(_row(number), 0.0) * number.size or TINY
     return replace(structure, scale=scale)
+
+
+def _row(number: Number) -> str:
+    return number.path.rpartition(".")[0]
 
 
 def _number_or_none(data: Mapping[str, Any], path: str) -> float | None:

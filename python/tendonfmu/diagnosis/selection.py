@@ -43,6 +43,7 @@ class LeastSizes:
     joint_noise: Numbers  # standard deviation of the noise of the joint positions, rad [n]
     tendon_noise: Numbers  # standard deviation of the noise of the tendon positions, m [m]
     step: float  # time between samples, s
+    heaviest: Numbers  # largest weight, N·m [n]: a larger one only imitates other torque beside the cover's
 
     def least(self, where: Where) -> float:
         """Return the least size in the unit of the effect's number; 0 if none is known."""
@@ -61,7 +62,9 @@ class LeastSizes:
         return least == 0.0 or LARGEST_SECANT * abs(float(next(iter(shape.values())))) >= least
 
     def shows(self, effect: str, place: Place, row: Mapping[str, Any] | None) -> bool:
-        """Return whether a fitted play or delay, a row of `extensions`, is large enough."""
+        """Return whether a fitted play or delay, a row of `extensions`, is large enough, and no weight too large."""
+        if row is not None and effect == "gravity" and place.joint is not None:
+            return bool(max(abs(row.get(key, 0.0)) for key in ("sine", "cosine")) <= self.heaviest[place.joint - 1])
         number = {"backlash": "width", "time_delay": "delay"}.get(effect)
         if row is None or number is None:
             return True
@@ -81,23 +84,22 @@ class LeastSizes:
 
 
 def least_sizes(data: Mapping[str, Any], recordings: Sequence[FitRecording], step: float) -> LeastSizes:
-    """Measure the sensor noise of recordings; `step` is the time between the samples that are estimated from, s."""
+    """Measure what recordings can show; `step` is the time between the samples that are estimated from, s."""
     joints: list[Numbers] = []
     tendons: list[Numbers] = []
+    heaviest, arms = np.zeros(len(data["joints"])), moment_arms(data)
     stiffness = np.array([tendon["stiffness"] for tendon in data["tendons"]])
     for recording in recordings:
         groups = recording.recording.groups
         angle, force = recording.model.joint_angle, groups["tendon_force"]
-        reached = (
-            groups["tendon_position"] - force / stiffness
-            if "tendon_position" in groups
-            else angle @ moment_arms(data).T
-        )
+        reached = groups["tendon_position"] - force / stiffness if "tendon_position" in groups else angle @ arms.T
+        most, reach = (np.abs(each[recording.train]).max(axis=0, initial=0.0) for each in (force @ arms, angle))
+        heaviest = np.maximum(heaviest, most / np.sin(np.clip(reach, 1e-9, np.pi / 2)))
         for part in recording.parts:
             rate = 1.0 / float(np.median(np.diff(recording.time[part])))
             for values, noise in ((angle[part], joints), (reached[part], tendons)):
                 noise.append(noise_of(values, zero_phase(values, NOISE_CUTOFF, rate)))
-    return LeastSizes(np.max(joints, axis=0), np.max(tendons, axis=0), step)
+    return LeastSizes(np.max(joints, axis=0), np.max(tendons, axis=0), step, heaviest)
 
 
 def noise_of(raw: Numbers, smooth: Numbers) -> Numbers:

@@ -191,10 +191,8 @@ class View:
     @property
     def candidates(self) -> list[Candidate]:
         """All effects that the description may lack."""
-        arms, used = moment_arms(self.data), self.series.used
-        torque = self.series.force @ arms
-        reach, most = (np.abs(each[used]).max(axis=0, initial=0.0) for each in (self.series.angle, torque))
-        return hypotheses(self.columns, arms, reach, most)
+        reach = np.abs(self.series.angle[self.series.used]).max(axis=0, initial=0.0)
+        return hypotheses(self.columns, moment_arms(self.data), reach, self.least.heaviest)
 
     def beside(self, keys: Collection[Where]) -> Selection:
         """Return what is missing if these causes are present, each with all its shapes at that place."""
