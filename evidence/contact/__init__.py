@@ -44,7 +44,7 @@ def scored(folder: Path, take: hand.Take, alarm: Flags) -> Row:
         "kind": take.kind,
         "pretension": take.pretension,
         "found": [event.found for event in score.events],
-        "delay": [event.delay for event in score.events],
+        "delay": [event.delay_s for event in score.events],
         "torque": torques,
         "seconds": score.free_seconds,
         "alarms": len(score.false_alarms),

@@ -145,8 +145,8 @@ def judged(folder: Path, alarm: Alarm, scale: float) -> Row:
         label = np.interp(times, frame["time"], frame["contact"]) > 0.5
         score = score_detection(times, label, flags)
         for event in score.events:
-            inside = frame["time"].between(event.onset - 0.01, event.end + 0.01).to_numpy()
-            pushes.append({"size": torque[inside].max(), "found": event.found, "delay": event.delay})
+            inside = frame["time"].between(event.onset_s - 0.01, event.end_s + 0.01).to_numpy()
+            pushes.append({"size": torque[inside].max(), "found": event.found, "delay": event.delay_s})
         alarms, seconds = alarms + len(score.false_alarms), seconds + score.free_seconds
     return {"pushes": pushes, "alarms": alarms, "minutes": seconds / 60.0}
 

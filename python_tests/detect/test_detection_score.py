@@ -30,7 +30,7 @@ def test_found_late_is_found_and_its_delay_is_that_of_the_first_alarm() -> None:
     score = score_detection(TIME, flags((2.0, 3.0), (5.0, 6.0)), flags((2.3, 2.32), (2.9, 3.0)))
     assert (len(score.events), score.found, score.missed, score.false_alarms) == (2, 1, 1, [])
     assert score.delays == pytest.approx([0.3])
-    assert math.isnan(score.events[1].delay) and score.events[1].silent
+    assert score.events[1].delay_s is None and score.events[1].silent_before
 
 
 @pytest.mark.parametrize(("until", "found"), [(1.78, 1), (1.79, 0), (2.0, 0), (3.0, 0)])
@@ -38,7 +38,7 @@ def test_an_alarm_less_than_200_ms_before_has_found_nothing(until: float, found:
     """Its last sample is 10 ms before `until`; the one 220 ms before the onset counts."""
     score = score_detection(TIME, flags((2.0, 3.0)), flags((1.0, until), (2.5, 2.6)))
     assert score.found == found
-    assert score.events[0].silent == bool(found)
+    assert score.events[0].silent_before == bool(found)
     assert summarise(score).missed_in_alarm == 1 - found
     assert score.false_alarms == [(pytest.approx(1.0), pytest.approx(until - 0.01))]
 
@@ -56,7 +56,7 @@ def test_labels_closer_than_100_ms_are_one_event(again: float, events: int) -> N
     """Between labelled samples: the last of the first stretch is at 2.99 s."""
     score = score_detection(TIME, flags((2.0, 3.0), (again, 4.0)), flags((2.2, 2.4)))
     assert len(score.events) == events
-    assert score.events[-1].end == pytest.approx(3.99)
+    assert score.events[-1].end_s == pytest.approx(3.99)
 
 
 def test_alarms_closer_than_100_ms_are_one() -> None:
@@ -69,7 +69,7 @@ def test_an_alarm_in_the_100_ms_after_an_event_is_neither_false_nor_finds_it(beg
     """The event's last sample is at 2.99 s. What lasts longer than the grace is overhang, or the false alarm's."""
     score = score_detection(TIME, flags((2.0, 3.0)), flags((begin, 4.0)))
     assert (score.found, len(score.false_alarms)) == (0, false)
-    assert score.events[0].overhang == pytest.approx(0.0 if false else 0.9)
+    assert score.events[0].overhang_s == pytest.approx(0.0 if false else 0.9)
     assert score.free_seconds == pytest.approx(8.9)
     assert score.free_alarm_share == pytest.approx((4.0 - max(begin, 3.1)) / 8.9)
 
@@ -86,7 +86,7 @@ def test_overhang_is_free_time_only_and_belongs_to_the_event_where_the_alarm_beg
     """It runs through a second event, which is therefore missed."""
     score = score_detection(TIME, flags((2.0, 3.0), (4.0, 5.0)), flags((2.5, 6.0)))
     assert [event.found for event in score.events] == [True, False]
-    assert [event.overhang for event in score.events] == pytest.approx([(4.0 - 3.1) + (6.0 - 5.1), 0.0])
+    assert [event.overhang_s for event in score.events] == pytest.approx([(4.0 - 3.1) + (6.0 - 5.1), 0.0])
     assert score.false_alarms == []
     summary = summarise(score)
     assert (summary.overhang.events, summary.missed_in_alarm) == (1, 1)

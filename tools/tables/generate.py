@@ -46,7 +46,7 @@ TYPED = {
     "hand": ("TendonFMU hand", "HandFile", "commands/hand/description.py"),
     "diagnosis": ("TendonFMU diagnosis", "DiagnosisReport", "report/diagnosis_types.py"),
     "fit_report": ("TendonFMU fit report", "FitReport", "recordings/columns.py", "estimate/fit_report.py"),
-    "score_report": ("TendonFMU score report", "ScoreReport", "detect/summary.py"),
+    "score_report": ("TendonFMU score report", "ScoreReport", "detect/counting.py", "detect/summary.py"),
     "tune_report": ("TendonFMU tune report", "TuneReport", "detect/tune_report.py"),
 }
 

@@ -192,26 +192,26 @@ def structure_of(found: Diagnosis) -> dict[str, Any]:
 def typical_push(scored: Scored) -> dict[str, Any] | None:
     """Return the found push with the median delay, as `PushShown` takes it; None if none is found."""
     found = [
-        (event.delay, event, track)
+        (event.delay_s, event, track)
         for track, score in zip(scored.tracks, scored.scores, strict=True)
         for event in score.events
-        if event.found
+        if event.delay_s is not None
     ]
     if not found:
         return None
     _, event, track = sorted(found, key=lambda each: each[0])[len(found) // 2]
     time, felt = track.recording.time, track.outputs["compensated_torque"]
-    during = (time >= event.onset) & (time <= event.end)
+    during = (time >= event.onset_s) & (time <= event.end_s)
     j = int(np.argmax(np.abs(felt[during] if track.external is None else track.external[during]).max(axis=0)))
-    rows = np.flatnonzero((time >= event.onset - BEFORE) & (time <= event.end + AFTER))
+    rows = np.flatnonzero((time >= event.onset_s - BEFORE) & (time <= event.end_s + AFTER))
     rows = rows[:: max(1, len(rows) // POINTS)]
     return {
         "recording": track.recording.path.name,
-        "onset": event.onset,
+        "onset": event.onset_s,
         "joint": scored.finger.joint_names[j],
-        "end": event.end - event.onset,
-        "delay": event.delay,
-        "time": (time[rows] - event.onset).tolist(),
+        "end": event.end_s - event.onset_s,
+        "delay": event.delay_s,
+        "time": (time[rows] - event.onset_s).tolist(),
         "felt": felt[rows, j].tolist(),
         "sensor": None if track.external is None else track.external[rows, j].tolist(),
     }
@@ -226,7 +226,7 @@ def by_size(scored: Scored, left: Sequence[float]) -> list[dict[str, Any]] | Non
         if track.external is None:
             return None
         for event in score.events:
-            touched = (track.recording.time >= event.onset) & (track.recording.time <= event.end)
+            touched = (track.recording.time >= event.onset_s) & (track.recording.time <= event.end_s)
             sizes.append(float((np.abs(track.external[touched]) / scale).max()))
             hits.append(event.found)
     low, rows = 0.0, []

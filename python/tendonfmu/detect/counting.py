@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.arrays import Flags, Numbers
+from tendonfmu.json_types import Index, Number, Size, Values
 from tendonfmu.recordings import gaps
 
 Spans = NDArray[np.int64]
@@ -43,31 +44,23 @@ class Signals:
 
 @dataclass(frozen=True)
 class Event:
-    """One labelled contact; times in s, NaN where there is none."""
+    """A labelled contact."""
 
-    onset: float  # first and last labelled sample
-    end: float
-    silent: bool  # whether no sample in the `SILENT` time before has contact
-    alarm: float = math.nan  # first sample of the first alarm that begins in [onset - LEAD, end]
-    held: bool = False  # whether that alarm lasts until less than `MERGED` before the end
-    held_share: float = math.nan  # share of the time from alarm to end that is contact
-    overhang: float = 0.0  # free time in alarms that began in the event or its grace (s)
-    compensated: Numbers | None = None  # [n] torques at the alarm (N·m)
-    external: Numbers | None = None
-    force: float = math.nan  # force at the alarm (N)
-    largest: float = math.nan  # largest torque of the reference sensor in the event (N·m), and its joint, from 0
-    joint: int | None = None
-    released: bool = False  # whether the alarm begins only as the load goes
-
-    @property
-    def found(self) -> bool:
-        """Whether the alarm begins in the event after silence."""
-        return self.silent and not math.isnan(self.alarm)
-
-    @property
-    def delay(self) -> float:
-        """Time from onset to alarm (s), at least -LEAD; NaN unless found."""
-        return self.alarm - self.onset if self.found else math.nan
+    onset_s: float  # s; first labelled sample.
+    end_s: float  # s; last labelled sample.
+    found: bool  # Whether the alarm begins in the event after silence.
+    silent_before: bool  # Whether there is no contact in the 0.2 s before the onset.
+    alarm_s: Number = None  # s; first sample of the first alarm that begins in the event.
+    delay_s: Number = None  # s; null unless found.
+    at_release: bool = False  # Whether the alarm begins only as the load goes.
+    largest_torque: Number = None  # N.m, largest torque of the reference sensor at any joint.
+    joint: Index | None = None  # Joint that bears it.
+    held: bool = False  # Whether the alarm lasts until less than 0.1 s before the end.
+    held_share: Number = None  # Share of the samples from the alarm to the end that are contact.
+    overhang_s: Size = 0.0  # s; free time in alarms that began in the event or its grace.
+    force: Number = None  # N, sensed force at the alarm.
+    external_torque: Values | None = None  # N.m by joint, at the alarm.
+    compensated_torque: Values | None = None  # N.m by joint, at the alarm.
 
 
 @dataclass(frozen=True)
@@ -127,7 +120,7 @@ class DetectionScore:
     @property
     def delays(self) -> Numbers:
         """[found] delays (s)."""
-        return np.array([event.delay for event in self.events if event.found], dtype=float)
+        return np.array([event.delay_s for event in self.events if event.delay_s is not None], dtype=float)
 
 
 def score_detection(time: Numbers, label: Flags, alarm: Flags, signals: Signals | None = None) -> DetectionScore:
@@ -148,7 +141,7 @@ def score_detection(time: Numbers, label: Flags, alarm: Flags, signals: Signals 
         false_alarms=[(float(time[begin]), float(time[end])) for begin, end in false],
         free=_free_blocks(seconds, free, alarm, given.residual),
         contact=_contact_sums(spans, given),
-        alarms_after_events=sum(any(0.0 < time[at] - event.end < AFTER for event in events) for at in false[:, 0]),
+        alarms_after_events=sum(any(0.0 < time[at] - event.end_s < AFTER for event in events) for at in false[:, 0]),
     )
 
 
@@ -191,35 +184,37 @@ def _event(time: Numbers, alarm: Flags, alarms: Spans, span: Spans, hanging: Num
     before, lead = (_ahead(time, first, seconds) for seconds in (LEAD + SILENT, LEAD))
     grace = int(np.searchsorted(time, time[last] + GRACE + _EQUAL))
     begun = alarms[(alarms[:, 0] >= lead) & (alarms[:, 0] < grace)]
+    silent, inside = not alarm[before:lead].any(), begun[begun[:, 0] <= last]
     event = Event(
-        onset=float(time[first]),
-        end=float(time[last]),
-        silent=not alarm[before:lead].any(),
-        overhang=float(sum(hanging[end + 1] - hanging[max(begin, first)] for begin, end in begun)),
-        **_load(time, first, last, given.external),
+        onset_s=float(time[first]),
+        end_s=float(time[last]),
+        found=silent and len(inside) > 0,
+        silent_before=silent,
+        overhang_s=float(sum(hanging[end + 1] - hanging[max(begin, first)] for begin, end in begun)),
+        **_load(first, last, given.external),
     )
-    inside = begun[begun[:, 0] <= last]
     if not len(inside):
         return event
     begin, end = int(inside[0, 0]), int(inside[0, 1])
     return replace(
         event,
-        alarm=float(time[begin]),
+        alarm_s=float(time[begin]),
+        delay_s=float(time[begin] - time[first]) if silent else None,
+        at_release=silent and bool(time[begin] > _lasts(time, first, last, given.external)),
         held=bool(time[last] - time[end] < MERGED - _EQUAL),
         held_share=float(alarm[begin : last + 1].mean()),
-        compensated=None if given.compensated is None else given.compensated[begin],
-        external=None if given.external is None else given.external[begin],
-        force=math.nan if given.force is None else float(given.force[begin]),
-        released=bool(time[begin] > _lasts(time, first, last, given.external)),
+        force=None if given.force is None else float(given.force[begin]),
+        external_torque=None if given.external is None else given.external[begin].tolist(),
+        compensated_torque=None if given.compensated is None else given.compensated[begin].tolist(),
     )
 
 
-def _load(time: Numbers, first: int, last: int, external: Numbers | None) -> dict[str, Any]:
+def _load(first: int, last: int, external: Numbers | None) -> dict[str, Any]:
     """Return the largest torque of the reference sensor in an event, and the joint that bears it."""
     if external is None:
         return {}
     size = np.abs(external[first : last + 1]).max(axis=0)
-    return {"largest": float(size.max()), "joint": int(size.argmax())}
+    return {"largest_torque": float(size.max()), "joint": int(size.argmax()) + 1}
 
 
 def _lasts(time: Numbers, first: int, last: int, external: Numbers | None) -> float:

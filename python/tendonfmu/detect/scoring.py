@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tendonfmu.arrays import Flags, Numbers
-from tendonfmu.detect.counting import GRACE, MERGED, SILENT, DetectionScore, Event, Signals, pooled, score_detection
+from tendonfmu.detect.counting import GRACE, MERGED, SILENT, DetectionScore, Signals, pooled, score_detection
 from tendonfmu.detect.free_motion import sensed_contact
 from tendonfmu.detect.summary import (
     FACTORS,
@@ -21,7 +21,6 @@ from tendonfmu.detect.summary import (
     Figures,
     Point,
     Roc,
-    ScoredEvent,
     ScoredRecording,
     ScoreReport,
     roc,
@@ -317,26 +316,6 @@ def _entry(track: Track, score: DetectionScore, figures: Figures) -> ScoredRecor
         external_torque=track.external is not None,
         sensed_force=track.force is not None,
         mean_force=float(np.abs(track.recording.groups["tendon_force"]).mean()),
-        event_list=[_event(event) for event in score.events],
+        event_list=score.events,
         false_alarm_list=[FalseAlarm(*alarm) for alarm in score.false_alarms],
-    )
-
-
-def _event(event: Event) -> ScoredEvent:
-    return ScoredEvent(
-        onset_s=event.onset,
-        end_s=event.end,
-        found=event.found,
-        silent_before=event.silent,
-        alarm_s=event.alarm,
-        delay_s=event.delay,
-        at_release=event.found and event.released,
-        largest_torque=event.largest,
-        joint=None if event.joint is None else event.joint + 1,
-        held=event.held,
-        held_share=event.held_share,
-        overhang_s=event.overhang,
-        force=event.force,
-        external_torque=None if event.external is None else event.external.tolist(),
-        compensated_torque=None if event.compensated is None else event.compensated.tolist(),
     )

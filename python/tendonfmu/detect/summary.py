@@ -113,25 +113,6 @@ class Figures:
 
 
 @dataclass(frozen=True)
-class ScoredEvent:
-    onset_s: float  # s; first labelled sample.
-    end_s: float  # s; last labelled sample.
-    found: bool
-    silent_before: bool  # Whether there is no contact in the 0.2 s before the onset.
-    alarm_s: Number  # s; first sample of the first alarm that begins in the event.
-    delay_s: Number  # s; null unless found.
-    at_release: bool  # Whether the alarm begins only as the load goes.
-    largest_torque: Number  # N.m, largest torque of the reference sensor at any joint.
-    joint: Index | None  # Joint that bears it.
-    held: bool
-    held_share: Number  # Share of the samples from the alarm to the end that are contact.
-    overhang_s: Size
-    force: Number  # N, sensed force at the alarm.
-    external_torque: Values | None  # N.m by joint, at the alarm.
-    compensated_torque: Values | None  # N.m by joint, at the alarm.
-
-
-@dataclass(frozen=True)
 class FalseAlarm:
     begin_s: float
     end_s: float  # s; last sample of the alarm.
@@ -146,7 +127,7 @@ class ScoredRecording(Figures):
     external_torque: bool  # Whether the recording has a reference sensor.
     sensed_force: bool  # Whether the recording has the column of --force.
     mean_force: Size  # N; mean of all tendon forces over all samples.
-    event_list: list[ScoredEvent]
+    event_list: list[Event]
     false_alarm_list: list[FalseAlarm]
 
 
@@ -209,8 +190,8 @@ def summarise(score: DetectionScore, seed: int = 0) -> Figures:
         events=len(score.events),
         found=len(found),
         missed=len(score.events) - len(found),
-        missed_in_alarm=sum(not event.silent for event in score.events),
-        found_at_release=sum(event.released for event in found),
+        missed_in_alarm=sum(not event.silent_before for event in score.events),
+        found_at_release=sum(event.at_release for event in found),
         found_share=Estimate.of(intervals.share(len(found), len(score.events))),
         false_alarms=alarms,
         false_alarms_after_events=score.alarms_after_events,
@@ -222,11 +203,11 @@ def summarise(score: DetectionScore, seed: int = 0) -> Figures:
         delay_s=Delays(**delays),
         held=held,
         held_share=Estimate.of(intervals.share(held, len(found))),
-        overhang=_overhang(np.array([event.overhang for event in score.events], dtype=float), seed),
+        overhang=_overhang(np.array([event.overhang_s for event in score.events], dtype=float), seed),
         at_alarm=AtAlarm(
             force=_force(found, seed),
-            external_torque=_torques([event.external for event in found], seed),
-            compensated_torque=_torques([event.compensated for event in found], seed),
+            external_torque=_torques([event.external_torque for event in found], seed),
+            compensated_torque=_torques([event.compensated_torque for event in found], seed),
         ),
         free_rms=[each.value for each in rms],
         free_rms_interval=[each.interval for each in rms],
@@ -252,13 +233,13 @@ def _overhang(seconds: Numbers, seed: int) -> Overhang:
 
 
 def _force(events: Sequence[Event], seed: int) -> Estimate | None:
-    known = np.array([event.force for event in events if not math.isnan(event.force)], dtype=float)
+    known = np.array([event.force for event in events if event.force is not None])
     return Estimate.of(intervals.quantile(known, 0.5, seed)) if len(known) else None
 
 
-def _torques(values: Sequence[Numbers | None], seed: int) -> Estimates:
+def _torques(values: Sequence[Values | None], seed: int) -> Estimates:
     """Compute the median magnitude of each joint."""
-    known = [np.abs(value) for value in values if value is not None]
+    known = [np.abs(np.array(value, dtype=float)) for value in values if value is not None]
     return [Estimate.of(intervals.quantile(each, 0.5, seed)) for each in np.array(known).T] if known else None
 
 
@@ -333,7 +314,7 @@ def roc(score_at: Callable[[float], DetectionScore], factors: Sequence[float] = 
             Point(
                 factor=factor,
                 found=score.found,
-                missed_in_alarm=sum(not event.silent for event in score.events),
+                missed_in_alarm=sum(not event.silent_before for event in score.events),
                 found_share=Estimate.of(intervals.share(score.found, len(score.events))),
                 false_alarms=alarms,
                 false_alarms_per_hour=Estimate.of(intervals.rate(alarms, score.free_seconds / 3600.0)),

@@ -135,8 +135,8 @@ def _detection(
 def _busiest(track: Track, score: DetectionScore) -> tuple[int, int, float]:
     """Find the earliest window of `SHOWN` seconds with most events: (events, those found, begin in s)."""
     time = track.recording.time
-    onsets = np.array([event.onset for event in score.events])
-    found = np.array([event.onset for event in score.events if event.found])
+    onsets = np.array([event.onset_s for event in score.events])
+    found = np.array([event.onset_s for event in score.events if event.found])
     alarms = np.array([begin for begin, _ in score.false_alarms])
     last = max(float(time[-1]) - SHOWN, float(time[0]))
     begins = np.clip([float(time[0]), *((onsets if len(onsets) else alarms) - 1.0)], time[0], last)
@@ -155,7 +155,7 @@ def _by_event(track: Track, score: DetectionScore) -> tuple[NDArray[np.bool_], N
     time = track.recording.time
     found, others = np.zeros(len(time), dtype=bool), np.zeros(len(time), dtype=bool)
     for event in score.events:
-        rows = (time >= event.onset) & (time <= event.end + GRACE)
+        rows = (time >= event.onset_s) & (time <= event.end_s + GRACE)
         (found if event.found else others)[rows] = True
     return found, others
 
@@ -177,11 +177,11 @@ def event_sheet(scored: Scored) -> draw.Sheet:
         (event, track) for track, score in zip(scored.tracks, scored.scores, strict=True) for event in score.events
     ]
     events.sort(key=lambda row: _order(row[0]))
-    length = np.array([event.end - event.onset for event, _ in events])
-    delay = np.array([event.delay for event, _ in events])  # NaN for missed events
+    length = np.array([event.end_s - event.onset_s for event, _ in events])
+    delay = np.array([event.delay_s for event, _ in events], dtype=float)  # NaN for missed events
     end = min(float(length.max()) + AFTER, LONGEST)
     grid = np.linspace(-BEFORE, end, _COLUMNS)
-    torque = 1e3 * np.array([_row(track, event.onset + grid) for event, track in events])
+    torque = 1e3 * np.array([_row(track, event.onset_s + grid) for event, track in events])
     count, summary = len(events), scored.summary
     groups = {
         "found": summary.found,
@@ -226,7 +226,9 @@ def event_sheet(scored: Scored) -> draw.Sheet:
 
 def _order(event: Event) -> tuple[int, float]:
     """Return a sort key: the group, and the place in it."""
-    return (0, event.delay) if event.found else (1 if event.silent else 2, event.end - event.onset)
+    if event.delay_s is not None:
+        return 0, event.delay_s
+    return 1 if event.silent_before else 2, event.end_s - event.onset_s
 
 
 def _row(track: Track, at: Numbers) -> Numbers:
