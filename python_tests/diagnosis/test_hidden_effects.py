@@ -107,7 +107,7 @@ def test_nothing_is_named_where_nothing_is_hidden(seed: int, presliding: bool, w
     ("effects", "strength"), [(("preload_friction", "inertia"), 1.0), (("gravity", "load_friction"), 3.0)]
 )
 def test_two_hidden_effects_are_both_found(effects: tuple[str, str], strength: float) -> None:
-    case = makers.double(1, replace(SHORT, presliding=True), effects, strength)
+    case = makers.double(1, replace(SHORT, presliding=True, seconds=60.0), effects, strength)
     sets = sets_of(case.diagnosed())
     assert all(any(effect in names for names in sets) for effect in effects)
 
@@ -147,7 +147,7 @@ def test_a_diagnosis_names_measures_and_extends() -> None:
 @pytest.mark.parametrize(("effect", "number"), [("preload_friction", "coulomb"), ("friction_drift", "amplitude")])
 def test_friction_that_builds_up_has_its_own_size(effect: str, number: str) -> None:
     """What acts on friction is found by how the friction of its place builds up, not by the sign of motion."""
-    case = makers.single(3, replace(SHORT, presliding=True), effect, 3.0)
+    case = makers.single(3, replace(SHORT, presliding=True, seconds=60.0), effect, 3.0)
     diagnosis = case.diagnosed()
     first = next(cause for cause in diagnosis.causes if cause.where.effect != "presliding")
     assert first.where.effect == effect
