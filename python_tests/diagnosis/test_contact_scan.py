@@ -13,15 +13,17 @@ import pytest
 
 from repetitions import repeated
 from synthetic_series import bias_splines, make_series, nuisance_of, residual_of, with_effect
-from tendonfmu.diagnosis.contact_scan import event_gain, left_out, scan_events, unusual
+from tendonfmu.arrays import Numbers
+from tendonfmu.diagnosis.contact_scan import event_gain, left_out, reached, scan_events, unusual
 from tendonfmu.diagnosis.result import Event
 from tendonfmu.diagnosis.samples import Series
 
 PUSHES = ((8.0, 8.4, 0, 1.0), (21.0, 22.4, 1, -1.0), (37.0, 37.8, 1, 1.0), (50.0, 51.1, 0, -1.0))  # s, s, joint, sign
 
 
-def events_of(series: Series) -> tuple[Event, ...]:
-    return scan_events(series, residual_of(series, nuisance_of(series)), bias_splines(series), ["rec"])
+def events_of(series: Series, usual: Numbers | None = None) -> tuple[Event, ...]:
+    residual = residual_of(series, nuisance_of(series))
+    return scan_events(series, residual, bias_splines(series), ["rec"], usual=usual)
 
 
 def pushed(series: Series) -> Series:
@@ -47,6 +49,21 @@ def test_pushes_are_found_with_time_and_joint(seed: int) -> None:
     out = left_out(series, found, ["rec"])
     assert out[(series.time > 21.1) & (series.time < 22.3)].all()
     assert not out[(series.time > 24.0) & (series.time < 36.0)].any()
+
+
+def test_what_free_motion_reaches_elsewhere_shows_pushes_that_are_the_rule() -> None:
+    """A touch every four seconds, of many sizes: by itself the recording has no usual residual."""
+    free, series = make_series(13), make_series(14)
+    spread, target = residual_of(series, nuisance_of(series)).std(axis=0), series.target.copy()
+    starts = np.arange(3.0, 57.0, 4.0)
+    for start, size in zip(starts, np.resize([4.0, 30.0, 8.0, 15.0], len(starts)), strict=True):
+        shape = np.clip(np.minimum(series.time - start, start + 1.4 - series.time) / 0.05, 0.0, 1.0)
+        target += size * spread * shape[:, None]
+    pushes, usual = replace(series, target=target), reached(free)
+    assert len(events_of(pushes)) < len(starts) // 2
+    found = events_of(pushes, usual)
+    assert all(any(event.start < start + 0.3 and event.end > start + 1.1 for event in found) for start in starts)
+    assert events_of(series, usual) == ()
 
 
 @pytest.mark.parametrize("seed", repeated([21, 22, 23], 0))

@@ -59,6 +59,7 @@ MERGED = 0.3  # s between parts of one event
 EXPLAINED = 0.5  # of the residual's variance: a learner that predicts more is subtracted
 PAD = 0.1  # s on either side
 MOST = 0.25  # of the time: something that is there more often is not an event
+FAR = 2.0  # times what free motion reaches elsewhere: another motion is not predicted as well
 # times the events of a reference: kicks at the start of a motion differ by a third in size
 LARGER, MORE = 1.5, 3.0
 MAD = 1.4826  # standard deviation of a normal distribution over its median absolute deviation
@@ -66,27 +67,54 @@ _TWO_SIDED = 1.96  # of the standard error, for a 95 % interval
 
 
 def scan_events(
-    series: Series, residual: Numbers, splines: Splines, recordings: Sequence[str], *, seed: int = 0
+    series: Series,
+    residual: Numbers,
+    splines: Splines,
+    recordings: Sequence[str],
+    *,
+    seed: int = 0,
+    usual: Numbers | None = None,
 ) -> tuple[Event, ...]:
-    """Find events in a residual [B, n], N·m, of the nominal model, in order of recording and time."""
+    """Find events in a residual [B, n], N·m, of a model, in order of recording and time.
+
+    usual: [W, n] what the same model's residual reaches in free motion elsewhere, N·m (`reached`).
+    """
     residual = np.where(series.used[:, None], residual, 0.0)
     plan = make_folds(series)
     if not plan.enough:
         return ()
-    learner = Learner(features(series, seed=seed), residual, splines, plan)
     left = np.array(series.target)
-    guess = learner.predicted(learner.columns)
-    # a prediction of most of the residual is an effect; a smaller one may be the push, learned from its neighbours
-    helps = learner.gains(guess).sum(axis=0) > EXPLAINED * np.sum(learner.target**2, axis=0)
-    left[plan.rows] -= np.where(helps, guess, 0.0)
-    inside = _outlying(series, left, plan, np.zeros(left.shape, dtype=bool))
+    if usual is None:
+        left[plan.rows] -= _predicted(series, residual, splines, plan, seed)
+    inside = _outlying(series, left, plan, np.zeros(left.shape, dtype=bool), usual)
     if inside.any():
         # scan again with a bias that ignores the blocks found so far
-        inside = _outlying(series, left, plan, inside)
-    if float(inside[plan.rows].any(axis=1).mean()) > MOST:
+        inside = _outlying(series, left, plan, inside, usual)
+    if float(inside[plan.rows].any(axis=1).mean()) > (MOST if usual is None else 2.0 * MOST):
         return ()
     left[plan.rows] = _flat(left, plan, inside, max(3, round(SLOW / series.step)))
     return tuple(_event(series, left, inside, rows, recordings) for rows in _stretches(series, inside))
+
+
+def _predicted(series: Series, residual: Numbers, splines: Splines, plan: Folds, seed: int) -> Numbers:
+    """Return what a learner predicts of the joints' residuals of which it predicts most, N·m [U, n]."""
+    learner = Learner(features(series, seed=seed), residual, splines, plan)
+    guess = learner.predicted(learner.columns)
+    # a prediction of most of the residual is an effect; a smaller one may be the push, learned from its neighbours
+    helps = learner.gains(guess).sum(axis=0) > EXPLAINED * np.sum(learner.target**2, axis=0)
+    return np.where(helps, guess, 0.0)
+
+
+def reached(series: Series) -> Numbers:
+    """Return what a residual without events reaches in means over windows of `WIDTHS`, N·m [W, n]."""
+    plan, known, levels = make_folds(series), np.zeros(series.target.shape, dtype=bool), list[Numbers]()
+    if not plan.enough:
+        return np.full((len(WIDTHS), len(known.T)), np.inf)
+    for width, slow in WIDTHS.items():
+        flat = _flat(series.target, plan, known, max(3, round(slow / series.step)))
+        means = [_sliding(column, plan.run, max(1, round(width / series.step))) for column in flat.T]
+        levels.append(np.abs(means).max(axis=1))
+    return np.array(levels)
 
 
 def left_out(series: Series, events: Sequence[Event], recordings: Sequence[str]) -> Flags:
@@ -126,7 +154,7 @@ def _slow(values: Numbers, run: NDArray[np.int64], length: int) -> Numbers:
     return np.asarray(result)
 
 
-def _outlying(series: Series, left: Numbers, plan: Folds, known: Flags) -> Flags:
+def _outlying(series: Series, left: Numbers, plan: Folds, known: Flags, usual: Numbers | None) -> Flags:
     """Return the blocks of windows that exceed what chance reaches [B, n]."""
     inside = np.zeros(left.shape, dtype=bool)
     tests = len(WIDTHS) * left.shape[1]
@@ -134,18 +162,31 @@ def _outlying(series: Series, left: Numbers, plan: Folds, known: Flags) -> Flags
     for joint in range(left.shape[1]):
         core = np.zeros(len(plan.rows), dtype=bool)
         jump = _jumps(series.velocity[plan.rows, joint])
-        for width, slow in WIDTHS.items():
+        for k, (width, slow) in enumerate(WIDTHS.items()):
             length = max(1, round(width / series.step))
             mean = _sliding(flat[slow][:, joint], plan.run, length)
             scale = MAD * float(np.median(np.abs(mean)))
             if scale > 0.0:
                 score = np.abs(mean) / scale
-                core |= _widened(score > _reach(score, plan, tests), plan.run, length)
+                most = _reach(score, plan, tests) if usual is None else FAR * float(usual[k, joint]) / scale
+                core |= _widened(score > most, plan.run, length)
                 core |= _widened(jump, plan.run, length) & _widened(score > LEAST, plan.run, length)
         mean = np.abs(_sliding(flat[SLOW][:, joint], plan.run, max(1, round(min(WIDTHS) / series.step))))
-        raised = mean > EDGE * MAD * float(np.median(mean))
-        inside[plan.rows, joint] = _reached(core, raised, plan.run)
+        edge = EDGE * MAD * float(np.median(mean))
+        raised = mean > (edge if usual is None else min(edge, float(usual[0, joint])))
+        found = _touched(core, raised, plan.run)
+        own = found if usual is None else _far(found, flat[SLOW][:, joint], usual[:, joint], series.step)
+        inside[plan.rows, joint] = own
     return inside
+
+
+def _far(inside: Flags, values: Numbers, usual: Numbers, step: float) -> Flags:
+    """Return the stretches that are far from what free motion reaches [W]: not only under the window of another one."""
+    widths, result = list(WIDTHS), np.zeros_like(inside)
+    for begin, end in flagged_rows(inside):
+        level = usual[min(int(np.searchsorted(widths, (end - begin) * step)), len(widths) - 1)]
+        result[begin:end] = np.sqrt(np.mean(values[begin:end] ** 2)) > FAR * level
+    return result
 
 
 def _jumps(velocity: Numbers) -> Flags:
@@ -155,7 +196,7 @@ def _jumps(velocity: Numbers) -> Flags:
     return np.asarray(speed > JUMP * np.quantile(moving, 0.9)) if len(moving) else np.zeros(len(speed), dtype=bool)
 
 
-def _reached(core: Flags, raised: Flags, run: NDArray[np.int64]) -> Flags:
+def _touched(core: Flags, raised: Flags, run: NDArray[np.int64]) -> Flags:
     """Return the stretches of raised rows of a run that touch a core; a core without raised rows stays as it is."""
     edge = np.flatnonzero((np.diff(raised.astype(int)) != 0) | (np.diff(run) != 0)) + 1
     result = np.zeros(len(core), dtype=bool)
@@ -246,12 +287,12 @@ def _circumstances(series: Series, rows: NDArray[np.int64], joint: int) -> str:
 # --- recordings without events ---------------------------------------------------------------------------------------
 
 
-def events_of(data: Data, samples: Samples, seed: int) -> tuple[tuple[Event, ...], Flags]:
+def events_of(data: Data, samples: Samples, seed: int, usual: Numbers | None = None) -> tuple[tuple[Event, ...], Flags]:
     """Find the stretches that no friction explains in the residual of a model."""
     # returns blocks that lie in an event [B]
     series = samples.series(data)
     names = [str(recording.path) for recording in samples.recordings]
-    events = scan_events(series, samples.residual(data), samples.splines, names, seed=seed)
+    events = scan_events(series, samples.residual(data), samples.splines, names, seed=seed, usual=usual)
     return events, left_out(series, events, names)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from tendonfmu.arrays import Data, Numbers
 from tendonfmu.diagnosis.answer import Asked, Compared, answered, cause_of, not_taken, reported
 from tendonfmu.diagnosis.base import Base, forgetful, refitted, remembering
-from tendonfmu.diagnosis.contact_scan import detection_gain, event_gain, events_of, without_events
+from tendonfmu.diagnosis.contact_scan import detection_gain, event_gain, events_of, reached, without_events
 from tendonfmu.diagnosis.delay import DELAY
 from tendonfmu.diagnosis.effects import CALIBRATED, CALIBRATION, Place, Term, Where
 from tendonfmu.diagnosis.effects.places import law_of
@@ -335,7 +335,8 @@ class Lacks:
         searched, given, asked = self._searched, self._given, self._asked
         data, threads = searched.model.data, asked.settings.threads
         each = [Samples.of(data, [recording], threads) for recording in given.tests]
-        unseen = [events_of(data, samples, asked.seed)[0] for samples in each]
+        usual = reached(searched.base.samples.series(data))
+        unseen = [events_of(data, samples, asked.seed, usual)[0] for samples in each]
         tests = [without_events(recording, events) for recording, events in zip(given.tests, unseen, strict=True)]
         self._events = (*searched.events, *(event for events in unseen for event in events))
         training = [without_events(recording, searched.events) for recording in given.training]
