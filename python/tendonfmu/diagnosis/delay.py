@@ -78,7 +78,8 @@ class Positions:
         groups = [set(each.recording.groups) for each in recordings]
         self._measured = all("joint_position" in own for own in groups)
         self._apart = np.eye(len(self._arms)) - (0.0 if self._measured else self._arms @ np.linalg.pinv(self._arms))
-        tells = all("tendon_position" in own for own in groups) and np.linalg.matrix_rank(self._apart) > 0
+        is_known = self._measured or np.linalg.matrix_rank(self._arms) < len(self._arms)
+        tells = is_known and all("tendon_position" in own for own in groups)
         tells = tells and any(self._stretches(each) for each in recordings)
         self._recordings = recordings if tells else ()
         self._behind = False  # whether the tendons' positions are as late as their forces
